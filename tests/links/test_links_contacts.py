@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from dem.engine.links.arrays import Segments
+from dem.engine.links import compiler, vectors
+from dem.engine.links.arrays import PLATE, Segments
+from dem.engine.links.contact import boundaries
 from dem.engine.links.neighbours.lists import build
 from dem.engine.links.shapes import RADIUS as RADIUS_AT
 from dem.physics.contact import damping_ratio
@@ -219,6 +221,59 @@ def test_neighbours_are_complete_in_a_moving_pile(rows: int) -> None:
             # The list was looked after before the last step: what has moved since is in its skin.
             assert (p, q) in listed
     assert pairs.counts[2] > 3
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+def test_the_wide_list_holds_all_near_segments_and_no_others(rows: int) -> None:
+    made = builds.engine(gravity=9.81, radius=0.0234, dt=5e-5, made_of=builds.particle(rows=rows))
+    rng = np.random.default_rng(5)
+    places = rng.uniform(-1, 1, size=(40, 3)) * [0.01, 0.01, 0.01] + [0, 0, 0.03]
+    made.add(builds.at(places, [Rotation.random(random_state=k) for k in range(40)]))
+    made.advance(1)
+    world = made._world
+    line, marks, body = world.segments.line, world.pairs.wide_marks, world.segments.body
+    # As they were when the list was built.
+    line[:, :3], line[:, 3:6] = marks[:, :3], marks[:, 3:6] - marks[:, :3]
+    distance = compiler.callable_from_python(distance_of_rows)
+    bare, expected = 2 * world.skins[1], set()
+    for p in range(len(line)):
+        for q in range(p + 1, len(line)):
+            reach = bare + line[p, RADIUS_AT] + line[q, RADIUS_AT] + marks[p, 6] + marks[q, 6]
+            if body[p] != body[q] and distance(line, p, q) < reach:
+                expected.add((p, q))
+    count = world.pairs.counts[0]
+    listed = list(zip(world.pairs.first[:count].tolist(), world.pairs.second[:count].tolist(), strict=True))
+    assert len(listed) == len(set(listed))
+    assert set(listed) == expected
+    assert len(listed) > 100 * rows
+
+
+def distance_of_rows(line: np.ndarray, p: int, q: int) -> float:
+    both = vectors.lines(line[p], line[q])
+    s, t = vectors.nearest(both)
+    return math.sqrt(vectors.square(vectors.between(both, s, t)))
+
+
+def test_a_segment_that_is_passed_over_touches_no_boundary() -> None:
+    made = builds.engine(radius=0.0234, made_of=builds.particle(rows=2))
+    rng = np.random.default_rng(7)
+    places = rng.uniform(-1, 1, size=(80, 3)) * [0.016, 0.016, 0.01] + [0, 0, 0.012]
+    made.add(builds.at(places, [Rotation.random(random_state=k) for k in range(80)]))
+    world = made._world
+    world.ground.place[PLATE] = 0.02
+    world.posed()
+    contacts, clear = (
+        builds.callable_from_python(one) for one in (boundaries.contacts_with_boundaries, boundaries._is_clear)
+    )
+    passed = touched = 0
+    for p in range(len(world.segments.line)):
+        count = contacts(world.segments, world.ground, None, None, None, p, world.scratch.contacts, world.meeting)
+        if clear(world.segments.line[p], world.ground, None, None, None):
+            passed += 1
+            assert count == 0
+        touched += count > 0
+    assert passed > 50
+    assert touched > 50
 
 
 def touching_segments(segments: Segments) -> list[tuple[int, int]]:

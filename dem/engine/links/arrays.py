@@ -117,9 +117,8 @@ class Cells(NamedTuple):
     centres: Array  #: (N, 3) centres of mass at the search [m]
     own: Array  #: (L, 6) lower and upper corner of the box about each link [m]
     boxes: Array  #: (6, L) corners of `own`, in the order of `order`; a row has one coordinate of all boxes [m]
-    strands: Indices  #: (L + 1,) index in `lines` of the first segment of each link, in the order of `order`
-    lines: Array  #: (Q, LINE + 1) segments and their skins [m], in the order of `order`
-    numbers: Indices  #: (Q,) number of the segment in each row of `lines`
+    #: (L, LINE + 1) middles of links and their skins [m], in the order of `order`; see `search.copy_by_bin`
+    lines: Array
     close: Indices  #: (2 L,) indices in `order` of links whose boxes overlap one link's box; second half: scratch
     places: Indices  #: (Q,) number of the group of each segment
     rows: Indices  #: (Q + 2,) index of the first pair of each group
@@ -227,9 +226,8 @@ class Motoring(NamedTuple):
     schedule: Array  #: (N, 2) angles of the schedule at the last control update [rad]
     torque: Array  #: (N, 2) mean torques on the barbs between the last two control updates [N m]
     work: Array  #: (N, 2) work on the links up to now [J]
-    halted: NDArray[
-        np.bool_
-    ]  #: (N, 2) whether the last update halted the motor, or under slip and servo found it at its limit
+    #: (N, 2) whether the last update halted the motor, or under slip and servo found it at its limit
+    halted: NDArray[np.bool_]
     momentum: Array  #: (N, 2) momenta p conjugate to the angles, see `motion.planar` [kg m²/s]
     impulse: Array  #: (N, 2) time integral of the torques since the last control update [N m s]
     elapsed: Array  #: (1,) time since the last control update [s]
@@ -372,20 +370,12 @@ def pairs_for(bodies: int, segments: int, capacity: int) -> Pairs:
         segments: number of segments of all bodies.
         capacity: largest number of pairs.
     """
+    f, indices = np.zeros, np.int32
     return Pairs(
-        np.zeros(capacity, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros((capacity, SLOTS, 4)),
-        np.zeros(capacity, np.uint8),
-        np.zeros(capacity, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros((capacity, 2)),
-        np.zeros(4, np.int64),
-        np.zeros((segments, 7)),
-        np.zeros((segments, 7)),
-        np.zeros((bodies, 3)),
-        np.zeros((bodies, 3)),
-    )
+        f(capacity, indices), f(capacity, indices), f((capacity, SLOTS, 4)), f(capacity, np.uint8),
+        f(capacity, indices), f(capacity, indices), f((capacity, 2)), f(4, np.int64),
+        f((segments, 7)), f((segments, 7)), f((bodies, 3)), f((bodies, 3)),
+    )  # fmt: skip
 
 
 def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
@@ -397,24 +387,10 @@ def cells_for(bodies: int, links: int, segments: int, capacity: int) -> Cells:
         segments: number of segments of all bodies.
         capacity: largest number of pairs.
     """
+    f, indices = np.zeros, np.int32
     return Cells(
-        np.zeros(links, np.int32),
-        np.zeros(links, np.int32),
-        np.zeros(BINS * links + 66, np.int32),
-        np.zeros((segments, 7)),
-        np.zeros((bodies, 3)),
-        np.zeros((links, 6)),
-        np.zeros((6, links)),
-        np.zeros(links + 1, np.int32),
-        np.zeros((segments, LINE + 1)),
-        np.zeros(segments, np.int32),
-        np.zeros(2 * links, np.int32),
-        np.zeros(segments, np.int32),
-        np.zeros(segments + 2, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros(capacity, np.int32),
-        np.zeros((capacity, SLOTS, 4)),
-        np.zeros(capacity, np.uint8),
-    )
+        f(links, indices), f(links, indices), f(BINS * links + 66, indices), f((segments, 7)), f((bodies, 3)),
+        f((links, 6)), f((6, links)), f((links, LINE + 1)), f(2 * links, indices), f(segments, indices),
+        f(segments + 2, indices), f(capacity, indices), f(capacity, indices), f(capacity, indices),
+        f(capacity, indices), f((capacity, SLOTS, 4)), f(capacity, np.uint8),
+    )  # fmt: skip

@@ -62,6 +62,12 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 @inlined
+def square(a: Vector) -> float:
+    """Return a · a."""
+    return dot(a, a)
+
+
+@inlined
 def cross(a: Vector, b: Vector) -> Vector:
     """Return a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

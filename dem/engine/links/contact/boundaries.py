@@ -142,6 +142,22 @@ def contacts_of_segment(
 
 
 @inlined
+def _is_clear(link: Array, ground: Ground, channel: Any, hooks: Any, rims: Any) -> bool:
+    """Return whether a segment touches no boundary, in one comparison; False where this is not known."""
+    if channel is not None or hooks is not None or rims is not None:
+        return False
+    x, y, z = vector(link, 0)
+    x1, y1, z1 = add((x, y, z), vector(link, 3))
+    radius = link[RADIUS]
+    inner = ground.radii[ground.radii.shape[0] - 1] - radius
+    return bool(
+        (radius - (min(z, z1) - ground.place[FLOOR]) <= 0.0)
+        & (radius - (ground.place[PLATE] - max(z, z1)) <= 0.0)
+        & ((ground.flags[0] == 0) | (max(x * x + y * y, x1 * x1 + y1 * y1) <= inner * inner))
+    )
+
+
+@inlined
 def _contacts_with_wall(radius: float, ground: Ground, slot: int, point: Vector, rows: Array, count: int) -> int:
     """Append the contacts of one end of a link with the wall, its edges and its ceilings to `rows`.
 
@@ -270,12 +286,8 @@ def _contacts_with_hooks(link: Array, ground: Ground, hooks: Hooks, rows: Array,
     return count
 
 
-@part
-def contacts_with_boundaries(
-    segments: Segments, ground: Ground, channel: Any, hooks: Any, rims: Any, p: int, rows: Array, met: Array
-) -> int:
-    """Call `contacts_of_segment`, not inlined, for queries, in which speed matters less."""
-    return contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
+# Not inlined, for queries, in which speed matters less.
+contacts_with_boundaries = part(contacts_of_segment.py_func)  # type: ignore[attr-defined] # Numba's, once compiled
 
 
 # -- forces ------------------------------------------------------------------------------------------------------
@@ -327,6 +339,8 @@ def push_boundaries(
     """
     lost = 0.0
     for p in range(segments.line.shape[0]):
+        if kept.contacts[p] == 0 and _is_clear(segments.line[p], ground, channel, hooks, rims):
+            continue
         count = contacts_of_segment(segments, ground, channel, hooks, rims, p, rows, met)
         if count == 0 and kept.contacts[p] == 0:
             continue
@@ -338,8 +352,7 @@ def push_boundaries(
         for slot in range(kept.used.shape[1]):
             if kept.used[p, slot] == 1:
                 lost += kept.slip[p, slot, 3]
-                for d in range(4):
-                    kept.slip[p, slot, d] = 0.0
+                kept.slip[p, slot] = 0.0
             kept.used[p, slot] >>= 1
         kept.contacts[p] = count
     return lost

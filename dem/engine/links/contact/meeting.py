@@ -44,6 +44,7 @@ from dem.engine.links.vectors import (
     nearest,
     put,
     scale,
+    square,
     sub,
     vector,
 )  # fmt: skip
@@ -152,20 +153,15 @@ def meets_elsewhere(both: Lines, reach: float, shared_p: int, shared_q: int) -> 
     of_start, of_end = clamp(e * both.inverse_c), clamp((b + e) * both.inverse_c)
     s1, t1 = 0.0 if lower <= 0.0 else lower, of_start if lower <= 0.0 else lower_t
     s2, t2 = 1.0 if upper >= 1.0 else upper, of_end if upper >= 1.0 else upper_t
-    first, second = _square(between(both, s1, t1)), _square(between(both, s2, t2))
+    first, second = square(between(both, s1, t1)), square(between(both, s2, t2))
     lie = (upper > 0.0) & (lower < 1.0) & (first < reach) & (second < reach)
     # The start of the first segment at the second one, that of the second at the first one, one start at the other.
-    of_p = _square(sub(both.w, scale(of_start, both.v)))
-    of_q = _square(sub(along(both.p, clamp(start), both.u), both.q))
-    starts = _square(both.w)
+    of_p = square(sub(both.w, scale(of_start, both.v)))
+    of_q = square(sub(along(both.p, clamp(start), both.u), both.q))
+    starts = square(both.w)
     start_p, start_q = (shared_p & AT_START) != 0, (shared_q & AT_START) != 0
     joints = int(start_p & (of_p < reach)) + int(start_q & (of_q < reach)) + int(start_p & start_q & (starts < reach))
     return int(lie) + joints + ((shared_p | shared_q) & AT_END)
-
-
-@inlined
-def _square(a: Vector) -> float:
-    return dot(a, a)
 
 
 @inlined
@@ -227,7 +223,7 @@ def _lie_along(
     if own_upper:
         s2, t2 = 1.0, clamp((b + e) * both.inverse_c)
     gap1, gap2 = between(both, s1, t1), between(both, s2, t2)
-    first, second = _square(gap1), _square(gap2)
+    first, second = square(gap1), square(gap2)
     if max(first, second) >= diameter * diameter:
         return 0
     first, second = math.sqrt(first), math.sqrt(second)
@@ -300,7 +296,7 @@ def _joint(
         best, least = -1, math.inf
         for k in range(POINTS):
             if out[k, SHARE] > 0.0 and out[k, CARRIED] > 0.0:
-                away = _square(sub(vector(out[k], PLACE), place))
+                away = square(sub(vector(out[k], PLACE), place))
                 if away < least:
                     best, least = k, away
         if best < 0:

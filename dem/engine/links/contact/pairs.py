@@ -302,7 +302,6 @@ def _forget(pairs: Pairs, pair: int, points: int) -> float:
     for slot in range(POINTS):
         if points & (1 << slot):
             energy += pairs.slip[pair, slot, 3]
-            for d in range(4):
-                pairs.slip[pair, slot, d] = 0.0
+            pairs.slip[pair, slot] = 0.0
     pairs.used[pair] &= ~points & 7
     return energy

@@ -1,12 +1,13 @@
 """Find all pairs of segments that are nearer to each other than a limit.
 
 The limit is the sum of both radii, both skins (distances by which segments may move until the next search) and a
-constant distance, the bare reach.
+constant distance, the bare reach. First near links are found, then their strands, which are segments side by side. A
+link counts as one segment in the middle of its strands, with a radius that encloses them.
 
 Every link has a box about all its segments, enlarged by their radii, their skins and half the bare reach. Boxes are
 sorted by their lower corners into strips along y and, within a strip, into short bins along x. All boxes that can
 overlap a given box then lie in a few contiguous ranges of memory, from the bin of its lower corner to the bin of its
-upper corner. Boxes and segments are copied in this order.
+upper corner. Boxes and middles are copied in this order.
 
 Up to `FEW` segments, the list of pairs is in the order of the segments' numbers. More segments do not fit into a
 processor's cache; their list is in the order of the bins, so that a step reads near segments one after the other.
@@ -19,8 +20,8 @@ from typing import Any, NamedTuple
 
 from dem.engine.links.arrays import Array, Cells, Indices, Segments
 from dem.engine.links.compiler import inlined, part
-from dem.engine.links.shapes import LINE, RADIUS
-from dem.engine.links.vectors import between, cross, dot, lines, nearest, sub, vector
+from dem.engine.links.shapes import INVERSE, LINE, RADIUS
+from dem.engine.links.vectors import add, between, cross, dot, lines, nearest, put, scale, sub, vector
 
 FEW = 3000  # segments; up to so many the list is in the order of their numbers
 SKIN = LINE  # place in a row of `Cells.lines`
@@ -180,23 +181,24 @@ def sort_bins(cells: Cells, grid: Grid) -> None:
 
 @inlined
 def copy_by_bin(segments: Segments, cells: Cells) -> None:
-    """Copy boxes and segments of links in the order of the bins, and number the groups of pairs.
+    """Copy boxes and middles of links in the order of the bins, and number the groups of pairs.
 
-    A group has all pairs with the same first segment. All fields of `cells` from `boxes` to `numbers`, and `places`,
-    are written.
+    A group has all pairs with the same first segment. The fields `boxes`, `lines` and `places` of `cells` are written.
     """
-    few, n = cells.marks.shape[0] <= FEW, 0
+    line, few, n = segments.line, cells.marks.shape[0] <= FEW, 0
     for m in range(cells.keys.shape[0]):
         link = cells.order[m]
         for d in range(6):
             cells.boxes[d, m] = cells.own[link, d]
-        cells.strands[m] = n
-        for p in range(segments.first[link], segments.first[link + 1]):
-            for d in range(LINE):
-                cells.lines[n, d] = segments.line[p, d]
-            cells.lines[n, SKIN], cells.numbers[n], cells.places[p] = cells.marks[p, 6], p, p if few else n
+        p, last, skin = segments.first[link], segments.first[link + 1] - 1, 0.0
+        for q in range(p, last + 1):
+            cells.places[q], skin = q if few else n, max(skin, cells.marks[q, 6])
             n += 1
-    cells.strands[cells.keys.shape[0]] = n
+        middle, across = cells.lines[m], sub(vector(line[last], 0), vector(line[p], 0))
+        put(middle, 0, scale(0.5, add(vector(line[p], 0), vector(line[last], 0))))
+        put(middle, 3, vector(line[p], 3))
+        middle[INVERSE], middle[RADIUS] = line[p, INVERSE], line[p, RADIUS] + 0.5 * math.sqrt(dot(across, across))
+        middle[SKIN] = skin
 
 
 @inlined
@@ -244,44 +246,53 @@ def find_pairs(segments: Segments, cells: Cells, grid: Grid) -> int:
     """Write all near pairs of segments that can touch into `cells.lower` and `cells.upper`.
 
     Args:
-        segments: the segments, with their bodies.
-        cells: links sorted into bins, with boxes and segments from `copy_by_bin`.
+        segments: the segments, with their links and bodies.
+        cells: links sorted into bins, with boxes and middles from `copy_by_bin`.
         grid: the bins.
 
     Returns:
         Number of pairs, or -1 if there is no room for all.
     """
-    number, capacity = 0, cells.lower.shape[0]
-    rows, starts, keys, boxes, strands = cells.lines, cells.starts, cells.keys, cells.boxes, cells.strands
-    numbers, close, lower, upper = cells.numbers, cells.close, cells.lower, cells.upper
+    number, capacity, line, first, marks = 0, cells.lower.shape[0], segments.line, segments.first, cells.marks
+    rows, starts, keys, boxes, order = cells.lines, cells.starts, cells.keys, cells.boxes, cells.order
+    close, lower, upper = cells.close, cells.lower, cells.upper
     nx, ny, x0, y0, size, width = grid.columns, grid.strips, grid.x, grid.y, grid.size, grid.width
     for m in range(keys.shape[0]):
         ly, lz, hx, hy, hz = boxes[1, m], boxes[2, m], boxes[3, m], boxes[4, m], boxes[5, m]
-        key = keys[cells.order[m]]
-        own, mine = segments.body[numbers[strands[m]]], key // nx
+        link = order[m]
+        key, p0 = keys[link], first[link]
+        own, mine = segments.body[p0], key // nx
         column, last = key - mine * nx, _bin(hx - x0, size, nx - 1)
-        boxed = 0
+        boxed, hits = 0, 0
         for strip in range(_bin(ly - grid.tallest - y0, width, ny - 1), _bin(hy - y0, width, ny - 1) + 1):
             # Of two links that begin in the same bins along x, the one in the lower strip finds the other.
             start = starts[strip * nx + column + (1 if strip >= mine else 2)]
             if strip == mine:
                 start = m + 1
             boxed = _boxed(boxes, close, boxed, start, starts[strip * nx + last + 2], ly, lz, hx, hy, hz)
-        for a in range(strands[m], strands[m + 1]):
-            p, skin, hits = numbers[a], grid.bare + rows[a, RADIUS] + rows[a, SKIN], number
-            for k in range(boxed):
-                for b in range(strands[close[k]], strands[close[k] + 1]):
-                    if hits == capacity:
-                        return -1
-                    reach = skin + rows[b, RADIUS] + rows[b, SKIN]
-                    upper[hits] = b
-                    q = numbers[b]
-                    hits += not (
-                        off_lines(rows, a, b, reach) | ((segments.body[q] == own) & _cannot_touch(segments.bends, p, q))
-                    )
-            for k in range(number, hits):
-                b = upper[k]
-                q = numbers[b]
-                lower[number], upper[number] = min(p, q), max(p, q)
-                number += near_each_other(rows, a, b, skin + rows[b, RADIUS] + rows[b, SKIN])
+        skin = grid.bare + rows[m, RADIUS] + rows[m, SKIN]
+        for k in range(boxed):
+            b = close[k]
+            close[hits] = b
+            q = first[order[b]]
+            hits += not (
+                off_lines(rows, m, b, skin + rows[b, RADIUS] + rows[b, SKIN])
+                | ((segments.body[q] == own) & _cannot_touch(segments.bends, p0, q))
+            )
+        for k in range(hits):
+            b = close[k]
+            i, j = min(link, order[b]), max(link, order[b])
+            strands = (first[i + 1] - first[i]) * (first[j + 1] - first[j])
+            if number + strands > capacity:
+                return -1
+            lower[number], upper[number] = first[i], first[j]
+            near = near_each_other(rows, m, b, skin + rows[b, RADIUS] + rows[b, SKIN])
+            if strands == 1:
+                number += near
+            elif near:
+                for p in range(first[i], first[i + 1]):
+                    for q in range(first[j], first[j + 1]):
+                        lower[number], upper[number] = p, q
+                        reach = grid.bare + line[p, RADIUS] + marks[p, 6] + line[q, RADIUS] + marks[q, 6]
+                        number += near_each_other(line, p, q, reach)
     return number

@@ -12,7 +12,7 @@ from typing import Any
 
 from dem.engine.links.arrays import Array, Bodies, Segments
 from dem.engine.links.compiler import inlined, part
-from dem.engine.links.vectors import Vector, add, dot, moving, put, sub, vector
+from dem.engine.links.vectors import Vector, add, dot, moving, put, square, sub, vector
 
 
 @part
@@ -24,21 +24,17 @@ def moved(bodies: Bodies, segments: Segments, marks: Array, centres: Array) -> b
         centres: (N, 3) recorded centres of mass [m], from which the mean motion follows.
     """
     mean, line = (0.0, 0.0, 0.0), segments.line
-    n, over = bodies.position.shape[0], False
+    n = bodies.position.shape[0]
     for i in range(n):
         mean = add(mean, sub(vector(bodies.position[i], 0), vector(centres[i], 0)))
     mean = mean[0] / n, mean[1] / n, mean[2] / n
     for p in range(line.shape[0]):
         at = sub(vector(line[p], 0), mean)
-        start = _square(sub(at, vector(marks[p], 0)))
-        end = _square(sub(add(at, vector(line[p], 3)), vector(marks[p], 3)))
-        over |= max(start, end) > marks[p, 6] * marks[p, 6]
-    return over
-
-
-@inlined
-def _square(a: Vector) -> float:
-    return a[0] ** 2 + a[1] ** 2 + a[2] ** 2
+        start = square(sub(at, vector(marks[p], 0)))
+        end = square(sub(add(at, vector(line[p], 3)), vector(marks[p], 3)))
+        if max(start, end) > marks[p, 6] * marks[p, 6]:
+            return True
+    return False
 
 
 @inlined
