@@ -6,7 +6,12 @@ from dem.engine.yade.construction import ADDS, ORDER
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.hinges import DAMPER_TIME, HingeLaw
 from dem.engine.yade.library import yade_threads, yade_version
-from dem.engine.yade.stable_step import hinged_stable_time_step, planar_stable_time_step, stable_time_step
+from dem.engine.yade.stable_step import (
+    filament_stable_time_step,
+    hinged_stable_time_step,
+    planar_stable_time_step,
+    stable_time_step,
+)
 
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
@@ -32,6 +37,9 @@ class YadeKind:
         law = contact_law_of(scene)
         if articulated and scene.channel is not None:
             return planar_stable_time_step(scene.particle, law, hinge_law(scene), scene.pulled_by)
+        rods = [body.filament for body in scene.bodies if body.filament is not None]
+        if rods:
+            return min(filament_stable_time_step(rod, law) for rod in rods)
         stable = min(stable_time_step(body, law) for body in scene.bodies)
         if articulated:
             stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
