@@ -188,7 +188,7 @@ class YadeEngine:
             if tied:
                 self.ledger.container_work += self.strings.pull(self.time_step)
             if filaments is not None:
-                filaments.damp(self.time_step)
+                filaments.resist(self.time_step)
             self.ledger.step(number, step)
             if measured:
                 self.boundaries.sum_forces()

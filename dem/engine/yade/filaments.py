@@ -4,8 +4,9 @@ Nodes have mass, are bonded to their neighbours, and touch floor and wall as sph
 container touches it at its ends only, so that this is exact. Connections have no mass; they touch other connections,
 and their forces act on their nodes.
 
-YADE's bonds have no dashpots. `YadeFilaments.damp` reduces the velocities of nodes between two steps, implicitly, which
-is stable for any damping.
+YADE's bonds have no dashpots. Before each step `YadeFilaments.resist` sets the forces of internal damping and drag on all
+nodes, which are implicit and so stable for any damping. The velocities themselves are left to YADE, since bonds and
+contacts sum displacements from them.
 """
 
 import math
@@ -28,6 +29,14 @@ from dem.engine.yade.construction import OF_BOUNDARIES, OF_NODES, OF_SEGMENTS, S
 from dem.engine.yade.hinges import HINGE_MATERIAL
 from dem.engine.yade.library import Yade, rows_of
 from dem.errors import RunError, reject
+
+# YADE turns the shear force of a bond to first order, which adds energy where nodes spin fast. Shear is damped by this
+# fraction of critical damping at least. It is small where a filament bends over several segments, which changes little.
+SHEAR_DAMPING = 0.1
+# Rows and columns of a bond's matrix on and below its diagonal: of its first node, then of its second. Bonds share
+# nodes, so that each part is added by itself.
+_ROWS, _COLUMNS = np.tril_indices(2 * FREEDOMS)
+PARTS = [(_ROWS[part], _COLUMNS[part]) for part in (_COLUMNS < FREEDOMS, _COLUMNS >= FREEDOMS)]
 
 
 class YadeFilaments(Assembly):
@@ -65,22 +74,22 @@ class YadeFilaments(Assembly):
         none = np.zeros((0, 4))
         each = [(f, f.nodes - 1) for f in self._filaments]
         self._springs = np.concatenate([none, *(np.tile(springs(f), (n, 1)) for f, n in each)])
-        times = [(f.stretching_time, f.bending_time, f.bending_time, f.stretching_time) for f, _ in each]
-        self._damping = self._springs * np.concatenate([none, *(np.tile(t, (n, 1)) for t, (_, n) in zip(times, each))])
+        self._damping = np.concatenate([none, *(np.tile(_dampers(f), (n, 1)) for f, n in each)])
         # Half a segment's drag across and along, and of its roll, acts on each of its nodes.
         self._drag = np.concatenate(
             [none[:, :3], *(np.tile(np.multiply(f.drags, f.segment_length / 2), (n, 1)) for f, n in each)]
         )
         self._masses = np.concatenate([np.zeros(0), *(f.masses for f, _ in each)])
         inertias = [np.tile(f.axial_inertia, n + 1) * f.masses / f.masses[1] for f, n in each]
-        self._inertias = np.concatenate([np.zeros(0), *inertias])
+        rolling = np.concatenate([np.zeros(0), *inertias])
+        self._inertia = np.repeat(np.stack([self._masses, rolling], axis=1), 3, axis=1)
         ends = np.cumsum([0, *(n + 1 for _, n in each)])
         self._starts = np.delete(np.arange(ends[-1]), ends[1:] - 1)
-        shares = np.repeat(self.weight_shares, np.diff(ends))
-        forces, vector = self._yade.omega.forces, self._yade.vector
-        for node, lift in zip(self._ids, (1 - shares) * self._masses * self._gravity, strict=True):
-            if lift:
-                forces.setPermF(node, vector(0, 0, lift))
+        self._lift = np.zeros((ends[-1], FREEDOMS))
+        self._lift[:, 2] = (1 - np.repeat(self.weight_shares, np.diff(ends))) * self._masses * self._gravity
+
+        if self._segments:  # YADE makes room for forces on new bodies; setting a constant force does not
+            self._yade.omega.forces.f(self._segments[-1][-1], True)
 
     @property
     def _filaments(self) -> list[Filament]:
@@ -165,14 +174,6 @@ class YadeFilaments(Assembly):
     def pile(self) -> PileState:
         """Return the state of all filaments."""
         table = self._rows()
-        broken = ~np.isfinite(table).all(axis=1)
-        begin = np.cumsum([0, *map(len, self._spheres)])[:-1]
-        reject(
-            np.logical_or.reduceat(broken, begin) if len(begin) else broken,
-            self._yade.omega.time,
-            "positions or velocities are no numbers, the simulation has blown up",
-            "lower fidelity.time_step_fraction",
-        )
         nodes, velocities, spins = np.split(table, (3, 6), axis=1)
         rolls, edges = np.zeros(len(nodes)), nodes[self._starts + 1] - nodes[self._starts]
         means = (spins[self._starts] + spins[self._starts + 1]) / 2
@@ -180,20 +181,33 @@ class YadeFilaments(Assembly):
         return FilamentState(self._mixture, np.array(self._kinds, dtype=np.int64), nodes, velocities, rolls)
 
     def _rows(self) -> Array:
-        """Return (n, 9) positions [m], velocities [m/s] and angular velocities [rad/s] of all nodes."""
+        """Return (n, 9) positions [m], velocities [m/s] and angular velocities [rad/s] of all nodes.
+
+        Raises:
+            RunError: one is not finite.
+        """
         rows = []
         for state in self._states:
             x, v, w = state.pos, state.vel, state.angVel
             rows.append((x[0], x[1], x[2], v[0], v[1], v[2], w[0], w[1], w[2]))
-        return np.array(rows).reshape(-1, 9)
+        table = np.array(rows).reshape(-1, 9)
+        broken = ~np.isfinite(table).all(axis=1)
+        if broken.any():
+            reject(
+                np.logical_or.reduceat(broken, np.cumsum([0, *map(len, self._spheres)])[:-1]),
+                self._yade.omega.time,
+                "positions or velocities are no numbers, the simulation has blown up",
+                "lower fidelity.time_step_fraction",
+            )
+        return table
 
     # -- damping and drag --------------------------------------------------------------------------------------
 
-    def damp(self, time_step: float) -> None:
-        """Reduce the motion of all nodes by internal damping and drag over a step dt [s]."""
-        dragged = self._drag.any()
-        if not dragged and not self._damping.any():
+    def resist(self, time_step: float) -> None:
+        """Set the forces of internal damping, drag and buoyancy on all nodes for a step dt [s]."""
+        if not self._ids:
             return
+        dragged = self._drag.any()
         table, starts = self._rows(), self._starts
         edges = table[starts + 1, :3] - table[starts, :3]
         blocks = matrices(edges, self._damping)
@@ -205,21 +219,18 @@ class YadeFilaments(Assembly):
             drag[:, 3:, 3:] = roll * along
             blocks[:, :FREEDOMS, :FREEDOMS] += drag
             blocks[:, FREEDOMS:, FREEDOMS:] += drag
-        inertia = np.repeat(np.stack([self._masses, self._inertias], axis=1), 3, axis=1)
-        band = np.zeros((2 * FREEDOMS, inertia.size))
-        band[0] = inertia.ravel()
-        row, column = np.tril_indices(2 * FREEDOMS)
-        # Bonds share nodes: of one bond the rows of its first node are added, then those of its second.
-        for part in (column < FREEDOMS, column >= FREEDOMS):
-            i, j = row[part], column[part]
+        band = np.zeros((2 * FREEDOMS, self._inertia.size))
+        band[0] = self._inertia.ravel()
+        for i, j in PARTS:
             band[i - j, FREEDOMS * starts[:, None] + j] += time_step * blocks[:, i, j]
-        before = table[:, 3:]
-        after = solveh_banded(band, (inertia * before).ravel(), lower=True, check_finite=False).reshape(before.shape)
-        vector = self._yade.vector
-        for state, (vx, vy, vz, wx, wy, wz) in zip(self._states, after.tolist(), strict=True):
-            state.vel, state.angVel = vector(vx, vy, vz), vector(wx, wy, wz)
-        lost = 0.5 * float((inertia * (before**2 - after**2)).sum())
-        slowed = 0.0
+        before, momenta = table[:, 3:], self._inertia * table[:, 3:]
+        after = solveh_banded(band, momenta.ravel(), lower=True, check_finite=False).reshape(before.shape)
+        forces = (self._inertia * after - momenta) / time_step
+        vector, pull, turn = self._yade.vector, self._yade.omega.forces.setPermF, self._yade.omega.forces.setPermT
+        for node, (x, y, z, a, b, c) in zip(self._ids, (forces + self._lift).tolist(), strict=True):
+            pull(node, vector(x, y, z))
+            turn(node, vector(a, b, c))
+        lost, slowed = 0.5 * float((self._inertia * (before**2 - after**2)).sum()), 0.0
         if dragged:
             slowed = time_step * sum(
                 float(np.einsum("bi,bij,bj->", after[node], drag, (before[node] + after[node]) / 2))
@@ -302,3 +313,11 @@ class YadeFilaments(Assembly):
         self._segments = [list(segments) for segments in memory["segments"]]
         self._kinds, self._losses = list(memory["kinds"]), list(memory["losses"])
         self.bind()
+
+
+def _dampers(filament: Filament) -> Array:
+    """Return (4,) dashpots of a bond: of stretching, shear [N s/m], bending, twisting [N m s/rad]."""
+    stiffness = springs(filament)
+    spinning = math.sqrt(filament.axial_inertia / stiffness[1]) / filament.segment_length
+    shear = max(filament.bending_time, 2 * SHEAR_DAMPING * spinning)
+    return stiffness * [filament.stretching_time, shear, filament.bending_time, filament.stretching_time]

@@ -1,0 +1,154 @@
+"""Filaments on YADE, and beside those on links, in a process of its own; see `cases.py`."""
+
+from typing import Any
+
+import numpy as np
+from scenes import small
+from scipy.spatial.transform import Rotation
+
+from dem.body.placement import Poses
+from dem.body.state import FilamentState
+from dem.engine.interface import Engine
+from dem.engine.yade.engine import YadeEngine
+from dem.engine.yade.filaments import YadeFilaments
+from dem.plan.steps import time_step
+from dem.run.build import build_engine
+
+L, D, DENSITY, E = 0.1, 4e-3, 1000.0, 1e6
+ROD: dict[str, Any] = {
+    "shape": "filament",
+    "length_m": L,
+    "diameter_m": D,
+    "density_kg_per_m3": DENSITY,
+    "young_modulus_Pa": E,
+    "segments": 20,
+}
+
+
+def built(particle: dict[str, Any], *, engine: str = "yade", dt: float | None = None, **changes: Any) -> Engine:
+    """An engine without filaments in a wide container."""
+    count = changes.pop("count", 1)
+    scene = small({"engine": engine, "count": count, "particle": particle, "container.radius_m": 0.3, **changes})
+    return build_engine(scene, dt or time_step(scene))
+
+
+def put(engine: Engine, *places: tuple[float, float, float], turns: tuple[Rotation, ...] = ()) -> None:
+    """Add straight or bent filaments, along x unless `turns` are given, with centres of mass at places [m]."""
+    turns = turns or (Rotation.identity(),) * len(places)
+    engine.add(Poses(np.array(places), turns, np.zeros(len(places), np.int64)))
+
+
+def inside(engine: Engine) -> tuple[YadeFilaments, list[Any]]:
+    """The filaments, and YADE's states of all nodes."""
+    assert isinstance(engine, YadeEngine)
+    assert engine.filaments is not None
+    return engine.filaments, engine.filaments._states
+
+
+def clamped(segments: int, gravity: float, bending_time: float) -> tuple[Engine, YadeFilaments]:
+    """A rod along x whose first node is held."""
+    rod = {**ROD, "segments": segments, "bending_time_s": bending_time}
+    engine = built(rod, **{"gravity_m_per_s2": gravity, "fidelity": {"base": "draft", "stiffness_N_per_m": 10}})
+    put(engine, (0.0, 0.0, 0.2))
+    filaments, states = inside(engine)
+    states[0].blockedDOFs = "xyzXYZ"
+    filaments._inertia[0] *= 1e6  # damping does not move it either
+    return engine, filaments
+
+
+def sagged(segments: int, gravity: float, slowest: float) -> np.ndarray:
+    """Deflection of the free end of a cantilever at rest, along x and z [m]."""
+    engine, filaments = clamped(segments, gravity, 2 / slowest)
+    engine.advance(round(24 / slowest / engine.time_step))
+    points = filaments.points(0)
+    return (points[-1] - points[0])[[0, 2]]
+
+
+def vibrating(segments: int, gravity: float, slowest: float, damping_time: float) -> dict[str, Any]:
+    """Height of the free end of a cantilever that was bent by its weight, which then vanishes."""
+    engine, filaments = clamped(segments, gravity, 2 / slowest)
+    engine.advance(round(24 / slowest / engine.time_step))
+    engine._omega.engines[-1].gravity = engine._yade.vector(0, 0, 0)
+    filaments._damping[:] *= damping_time * slowest / 2
+    times, heights = [], []
+    for _ in range(round(25 / slowest / engine.time_step / 20)):
+        engine.advance(20)
+        points = filaments.points(0)
+        times.append(engine.time)
+        heights.append(points[-1, 2] - points[0, 2])
+    return {"times": np.array(times), "heights": np.array(heights)}
+
+
+def free(damped: bool, steps: int) -> dict[str, Any]:
+    """Momentum, angular momentum and energies of a free, bent filament that tumbles and vibrates."""
+    times = {"stretching_time_s": 1e-3, "bending_time_s": 0.02} if damped else {}
+    engine = built({**ROD, "poured_bend_deg": 120, "segments": 10, **times}, **{"gravity_m_per_s2": 1e-6})
+    put(engine, (0.0, 0.0, 0.2))
+    filaments, states = inside(engine)
+    rng = np.random.default_rng(3)
+    for state in states:
+        state.vel = engine._yade.vector(*rng.normal(0, 0.05, 3))
+        state.angVel = engine._yade.vector(*rng.normal(0, 5, 3))
+    rows = []
+    for _ in range(20):
+        engine.advance(steps // 20)
+        table = filaments._rows()
+        x, v, w = np.split(table, (3, 6), axis=1)
+        m, inertia = filaments._masses[:, None], filaments._inertia[:, 3:]
+        kinetic = 0.5 * float((m * v**2).sum() + (inertia * w**2).sum())
+        turning = (np.cross(x, m * v) + inertia * w).sum(axis=0)
+        rows.append([*(m * v).sum(axis=0), *turning, kinetic, filaments.elastic_energy(), sum(filaments._losses)])
+    return {"rows": np.array(rows), "scale": np.abs(filaments._masses).sum() * 0.05}
+
+
+def sinking() -> dict[str, Any]:
+    """Speed of a straight filament that sinks across its axis, and along it."""
+    found = {}
+    liquid = {"density_kg_per_m3": 800, "viscosity_Pa_s": 2.0}
+    for name, turn in (("across", Rotation.identity()), ("along", Rotation.from_rotvec([0, np.pi / 2, 0]))):
+        engine = built({**ROD, "segments": 10}, liquid=liquid)
+        put(engine, (0.0, 0.0, 0.15), turns=(turn,))
+        engine.advance(round(0.05 / engine.time_step))
+        filaments, state = engine.filaments, engine.state()
+        assert filaments is not None
+        found[name] = -state.velocities[0, 2]
+        fallen = 0.15 - state.positions[0, 2]
+        found[f"{name} loss"] = filaments.energies.dragged / (0.2 * engine.particle.mass * engine.gravity * fallen)
+        found[f"{name} impulse"] = engine.impulse / (0.2 * engine.particle.mass * engine.gravity * engine.time)
+    return found
+
+
+WORM: dict[str, Any] = {
+    "shape": "filament",
+    "length_m": 0.03,
+    "diameter_m": 0.8e-3,
+    "segments": 10,
+    "young_modulus_Pa": 5e4,
+    "stretching_time_s": 1e-4,
+    "bending_time_s": 2e-3,
+}
+
+
+def pair(engine: str, seconds: float, offset: float = 0.0) -> dict[str, Any]:
+    """Two worms that fall, cross each other and hit the floor."""
+    contact = {"friction_smarticle": 0.3, "friction_wall": 0.3, "restitution": 1.0}
+    found = built(
+        WORM, engine=engine, count=2, contact=contact, fidelity={"base": "reference", "stiffness_N_per_m": 10}
+    )  # fmt: skip
+    put(
+        found, (0.0, 0.0, 3e-3), (4.5e-3, 1e-3 + offset, 6e-3),
+        turns=(Rotation.identity(), Rotation.from_rotvec([0, 0, 1.2])),
+    )  # fmt: skip
+    rows, every = [], max(1, round(1e-3 / found.time_step))
+    deepest = 0.0
+    while found.time < seconds:
+        found.advance(every)
+        state = found.state()
+        assert isinstance(state, FilamentState)
+        assert found.filaments is not None
+        deepest = max(deepest, found.overlaps(1.0).deepest)
+        rows.append(
+            [found.time, *state.positions[:, 2], *state.velocities[:, 2], state.kinetic_energy,
+             found.filaments.energies.elastic, *state.positions[1, :2], *state.nodes[::5, 2]]
+        )  # fmt: skip
+    return {"rows": np.array(rows), "deepest": deepest, "neighbours": found.neighbours()}
