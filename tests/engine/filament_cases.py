@@ -7,7 +7,6 @@ from scenes import small
 from scipy.spatial.transform import Rotation
 
 from dem.body.placement import Poses
-from dem.body.state import FilamentState
 from dem.engine.interface import Engine
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.filaments import YadeFilaments
@@ -129,26 +128,37 @@ WORM: dict[str, Any] = {
 }
 
 
-def pair(engine: str, seconds: float, offset: float = 0.0) -> dict[str, Any]:
-    """Two worms that fall, cross each other and hit the floor."""
-    contact = {"friction_smarticle": 0.3, "friction_wall": 0.3, "restitution": 1.0}
-    found = built(
-        WORM, engine=engine, count=2, contact=contact, fidelity={"base": "reference", "stiffness_N_per_m": 10}
-    )  # fmt: skip
-    put(
-        found, (0.0, 0.0, 3e-3), (4.5e-3, 1e-3 + offset, 6e-3),
-        turns=(Rotation.identity(), Rotation.from_rotvec([0, 0, 1.2])),
-    )  # fmt: skip
-    rows, every = [], max(1, round(1e-3 / found.time_step))
-    deepest = 0.0
+ELASTIC = {"friction_smarticle": 0.3, "friction_wall": 0.3, "restitution": 1.0}
+FINE = {"base": "reference", "stiffness_N_per_m": 10}
+
+
+def pair(engine: str, seconds: float) -> dict[str, Any]:
+    """Two worms that fall: the lower one bounces off the floor, then hits the upper one; by rows of time."""
+    found = built(WORM, engine=engine, count=2, contact=ELASTIC, fidelity=FINE)
+    turns = (Rotation.identity(), Rotation.from_rotvec([0, 0, 1.2]))
+    put(found, (0.0, 0.0, 3e-3), (4.5e-3, 1e-3, 6e-3), turns=turns)
+    rows, every = [], max(1, round(5e-4 / found.time_step))
     while found.time < seconds:
         found.advance(every)
         state = found.state()
-        assert isinstance(state, FilamentState)
-        assert found.filaments is not None
-        deepest = max(deepest, found.overlaps(1.0).deepest)
-        rows.append(
-            [found.time, *state.positions[:, 2], *state.velocities[:, 2], state.kinetic_energy,
-             found.filaments.energies.elastic, *state.positions[1, :2], *state.nodes[::5, 2]]
-        )  # fmt: skip
-    return {"rows": np.array(rows), "deepest": deepest, "neighbours": found.neighbours()}
+        rows.append([found.time, *state.positions[:, 2], *state.velocities[:, 2], state.kinetic_energy])
+    return {"rows": np.array(rows)}
+
+
+def hit(engine: str, place: tuple[float, float], angle: float) -> dict[str, Any]:
+    """A worm that hits another one, which is at rest; `place` is its middle [m], `angle` that between both [rad]."""
+    found = built(WORM, engine=engine, count=2, contact=ELASTIC, fidelity=FINE, gravity_m_per_s2=1e-6)
+    put(found, (0.0, 0.0, 0.05))
+    found.add(Poses(np.array([[*place, 0.0515]]), (Rotation.from_rotvec([0, 0, angle]),), np.zeros(1, int)), speed=0.2)
+    deepest, touching = 0.0, 0
+    while found.time < 0.012:
+        found.advance(1)
+        depth = found.overlaps(1.0).deepest
+        deepest, touching = max(deepest, depth), touching + (depth > 0)
+    velocities = found.state().velocities
+    return {
+        "gained": -velocities[0, 2],
+        "momentum": np.abs(velocities.sum(axis=0) - [0, 0, -0.2]).max(),
+        "deepest": deepest,
+        "time": touching * found.time_step,
+    }

@@ -4,13 +4,14 @@ Nodes have mass, are bonded to their neighbours, and touch floor and wall as sph
 container touches it at its ends only, so that this is exact. Connections have no mass; they touch other connections,
 and their forces act on their nodes.
 
-YADE's bonds have no dashpots. Before each step `YadeFilaments.resist` sets the forces of internal damping and drag on all
-nodes, which are implicit and so stable for any damping. The velocities themselves are left to YADE, since bonds and
+YADE's bonds have no dashpots. Before each step `YadeFilaments.resist` sets the forces of internal damping and drag on
+all nodes, which are implicit and so stable for any damping. The velocities themselves are left to YADE, since bonds and
 contacts sum displacements from them.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,7 @@ class YadeFilaments(Assembly):
         }
         super().bind()
         interactions = self._yade.omega.interactions
-        self._bonds = [interactions[a, b] for nodes in self._spheres for a, b in zip(nodes, nodes[1:], strict=False)]
+        self._bonds = [interactions[a, b] for nodes in self._spheres for a, b in pairwise(nodes)]
         none = np.zeros((0, 4))
         each = [(f, f.nodes - 1) for f in self._filaments]
         self._springs = np.concatenate([none, *(np.tile(springs(f), (n, 1)) for f, n in each)])
@@ -87,7 +88,6 @@ class YadeFilaments(Assembly):
         self._starts = np.delete(np.arange(ends[-1]), ends[1:] - 1)
         self._lift = np.zeros((ends[-1], FREEDOMS))
         self._lift[:, 2] = (1 - np.repeat(self.weight_shares, np.diff(ends))) * self._masses * self._gravity
-
         if self._segments:  # YADE makes room for forces on new bodies; setting a constant force does not
             self._yade.omega.forces.f(self._segments[-1][-1], True)
 
@@ -148,7 +148,7 @@ class YadeFilaments(Assembly):
             inertia = filament.axial_inertia * mass / filament.masses[1]
             body.state.inertia = yade.vector(inertia, inertia, inertia)
             nodes.append(int(bodies.append(body)))
-        for one, other in zip(nodes, nodes[1:], strict=False):
+        for one, other in pairwise(nodes):
             bond = yade.utils.createInteraction(one, other)
             phys = bond.phys
             phys.kn, phys.ks, phys.kr, phys.ktw = (float(value) for value in springs(filament))
@@ -223,14 +223,17 @@ class YadeFilaments(Assembly):
         band[0] = self._inertia.ravel()
         for i, j in PARTS:
             band[i - j, FREEDOMS * starts[:, None] + j] += time_step * blocks[:, i, j]
-        before, momenta = table[:, 3:], self._inertia * table[:, 3:]
-        after = solveh_banded(band, momenta.ravel(), lower=True, check_finite=False).reshape(before.shape)
-        forces = (self._inertia * after - momenta) / time_step
+        # The weight is known, and is resisted at once; other forces are resisted from the next step on.
+        before, weight = table[:, 3:], np.zeros((len(table), FREEDOMS))
+        weight[:, 2] = self._lift[:, 2] - self._masses * self._gravity
+        driven = self._inertia * before + time_step * weight
+        after = solveh_banded(band, driven.ravel(), lower=True, check_finite=False).reshape(before.shape)
+        forces = (self._inertia * after - driven) / time_step
         vector, pull, turn = self._yade.vector, self._yade.omega.forces.setPermF, self._yade.omega.forces.setPermT
         for node, (x, y, z, a, b, c) in zip(self._ids, (forces + self._lift).tolist(), strict=True):
             pull(node, vector(x, y, z))
             turn(node, vector(a, b, c))
-        lost, slowed = 0.5 * float((self._inertia * (before**2 - after**2)).sum()), 0.0
+        lost, slowed = -time_step * float((forces * (before + after) / 2).sum()), 0.0
         if dragged:
             slowed = time_step * sum(
                 float(np.einsum("bi,bij,bj->", after[node], drag, (before[node] + after[node]) / 2))
@@ -297,9 +300,18 @@ class YadeFilaments(Assembly):
     @property
     def energies(self) -> FilamentEnergies:
         """Energies of all filaments at present, and losses since the start."""
-        state = self.pile()
+        state, (damped, dragged) = self.pile(), self._losses
+        stretching, bending, twisting = self._elastic()
         return FilamentEnergies(
-            state.kinetic_energy, state.potential_energy(self._gravity, 0.0), *self._elastic(), *self._losses, 0.0, 0.0
+            kinetic=state.kinetic_energy,
+            potential=state.potential_energy(self._gravity, 0.0),
+            stretching=stretching,
+            bending=bending,
+            twisting=twisting,
+            damped=damped,
+            dragged=dragged,
+            active=0.0,
+            gripped=0.0,
         )
 
     # -- checkpoints -------------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ CONTACTS_AT_A_TIP = 2
 # Contacts of a sphere with a parallel row of spheres: the nearest sphere and its two neighbours, while the overlap in
 # diameters is below a twentieth of the pitch squared.
 CONTACTS_IN_A_ROW = 3
-# Contacts of two filaments that cross at an inner node of both, since YADE counts each pair of segments that meets there.
+# Contacts of two filaments that cross at a node of both: YADE counts each pair of segments that meet there.
 CONTACTS_AT_A_NODE = 4
 NODES = 12  # of a filament that are enough for its highest frequency
 
