@@ -1,5 +1,6 @@
 """Filaments on YADE, and beside those on links, in a process of its own; see `cases.py`."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from dem.engine.interface import Engine
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.filaments import YadeFilaments
 from dem.plan.steps import time_step
+from dem.record.run import Run
 from dem.run.build import build_engine
+from dem.run.run import run_scene
 
 L, D, DENSITY, E = 0.1, 4e-3, 1000.0, 1e6
 ROD: dict[str, Any] = {
@@ -162,3 +165,33 @@ def hit(engine: str, place: tuple[float, float], angle: float) -> dict[str, Any]
         "deepest": deepest,
         "time": touching * found.time_step,
     }
+
+
+def poured(engine: str, seed: int, out: str) -> dict[str, float]:
+    """Packing fraction and height of the centre of mass of 20 worms, after the pour and after a shake."""
+    phases = [
+        {"type": "deposit", "per_layer": 4},
+        {"type": "relax", "duration_s": 0.2},
+        {"type": "shake", "duration_s": 0.5, "frequency_hz": 30, "peak_acceleration_g": 2},
+        {"type": "relax", "duration_s": 0.2},
+    ]
+    changes = {
+        "engine": engine,
+        "seed": seed,
+        "count": 20,
+        "particle": {**WORM, "poured_bend_deg": 200},
+        "container.radius_m": 0.012,
+        "contact": ELASTIC | {"restitution": 0.4},
+        "fidelity": {"base": "draft", "stiffness_N_per_m": 10},
+        "phases": phases,
+        "recording": {"series_interval_s": 0.01, "frame_interval_s": 0.1, "checkpoint_interval_s": 0.2},
+    }
+    run_scene(small(changes), Path(out), command="", progress=False)
+    series = Run(Path(out)).series
+    found = {}
+    for name, phase in (("poured", 1), ("shaken", 3)):
+        last = np.flatnonzero(series["phase"] == phase)[-1]
+        found[f"{name} fraction"] = float(series["packing_fraction"][last])
+        found[f"{name} height"] = float(series["com_height_m"][last])
+        found[f"{name} unbalanced"] = float(series["unbalanced_force"][last])
+    return found

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -168,3 +169,18 @@ def test_a_pile_is_poured_shaken_and_freed_and_goes_on_with_the_same_bits(tmp_pa
         assert (series[name] >= 0).all()
         assert series[name].max() > 0
     assert np.abs(series["container_work_J"]).max() > 0
+
+
+@pytest.mark.long
+def test_small_piles_are_as_dense_and_as_high_as_on_links(worker: ProcessPoolExecutor, tmp_path: Path) -> None:
+    seeds = range(1, 7)
+    links, yade = (
+        [worker.submit(filament_cases.poured, engine, k, str(tmp_path / f"{engine}{k}")).result(1800) for k in seeds]
+        for engine in ("links", "yade")
+    )
+    for name in ("poured fraction", "poured height", "shaken fraction", "shaken height"):
+        one, other = (np.array([found[name] for found in each]) for each in (links, yade))
+        error = math.hypot(one.std(ddof=1), other.std(ddof=1)) / math.sqrt(len(seeds))
+        # Standard errors are 3 to 5 % of the means.
+        assert abs(one.mean() - other.mean()) < 3 * error, name
+    assert max(found["poured unbalanced"] for found in yade) < 0.05
