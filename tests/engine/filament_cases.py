@@ -104,19 +104,19 @@ def free(damped: bool, steps: int) -> dict[str, Any]:
 
 
 def sinking() -> dict[str, Any]:
-    """Speed of a straight filament that sinks across its axis, and along it."""
+    """Speed, impulse and energy of a straight filament that sinks across its axis, and along it."""
     found = {}
-    liquid = {"density_kg_per_m3": 800, "viscosity_Pa_s": 2.0}
+    liquid = {"density_kg_per_m3": 800, "viscosity_Pa_s": 0.1}
     for name, turn in (("across", Rotation.identity()), ("along", Rotation.from_rotvec([0, np.pi / 2, 0]))):
         engine = built({**ROD, "segments": 10}, liquid=liquid)
-        put(engine, (0.0, 0.0, 0.15), turns=(turn,))
-        engine.advance(round(0.05 / engine.time_step))
-        filaments, state = engine.filaments, engine.state()
+        put(engine, (0.0, 0.0, 0.25), turns=(turn,))
+        engine.advance(round(0.35 / engine.time_step))
+        filaments, state, weight = engine.filaments, engine.state(), 0.2 * engine.particle.mass * engine.gravity
         assert filaments is not None
         found[name] = -state.velocities[0, 2]
-        fallen = 0.15 - state.positions[0, 2]
-        found[f"{name} loss"] = filaments.energies.dragged / (0.2 * engine.particle.mass * engine.gravity * fallen)
-        found[f"{name} impulse"] = engine.impulse / (0.2 * engine.particle.mass * engine.gravity * engine.time)
+        given = weight * (0.25 - state.positions[0, 2])
+        found[f"{name} energy"] = (filaments.energies.dragged + state.kinetic_energy) / given
+        found[f"{name} impulse"] = engine.impulse / (weight * engine.time)
     return found
 
 

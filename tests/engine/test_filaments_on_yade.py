@@ -84,12 +84,13 @@ def test_a_free_filament_keeps_momentum_and_accounts_for_energy(simulate: Simula
 
 def test_drag_and_buoyancy_follow_their_formulas(simulate: Simulate) -> None:
     found = simulate(filament_cases.sinking)
-    across = 4 * math.pi * 2.0 / (math.log(L / D) + 0.5)
+    across = 4 * math.pi * 0.1 / (math.log(L / D) + 0.5)
     weight = 0.2 * MU * 9.81
     for name, drag in (("across", across), ("along", across / 2)):
-        assert found[name] == pytest.approx(weight / drag, rel=1e-3)
-        # The rest is kinetic energy.
-        assert found[f"{name} loss"] == pytest.approx(1.0, abs=0.06)
+        # Drag lags by a step of a quarter of a percent of the time in which it slows a filament.
+        reached = 1 - math.exp(-drag / MU * 0.35)
+        assert found[name] == pytest.approx(reached * weight / drag, rel=5e-3)
+        assert found[f"{name} energy"] == pytest.approx(1.0, abs=5e-3)
         assert found[f"{name} impulse"] == pytest.approx(1.0, rel=1e-9)
 
 

@@ -223,12 +223,10 @@ class YadeFilaments(Assembly):
         band[0] = self._inertia.ravel()
         for i, j in PARTS:
             band[i - j, FREEDOMS * starts[:, None] + j] += time_step * blocks[:, i, j]
-        # The weight is known, and is resisted at once; other forces are resisted from the next step on.
-        before, weight = table[:, 3:], np.zeros((len(table), FREEDOMS))
-        weight[:, 2] = self._lift[:, 2] - self._masses * self._gravity
-        driven = self._inertia * before + time_step * weight
-        after = solveh_banded(band, driven.ravel(), lower=True, check_finite=False).reshape(before.shape)
-        forces = (self._inertia * after - driven) / time_step
+        # From the velocities before the step, without the forces of the step, which balance each other at rest.
+        before, momenta = table[:, 3:], self._inertia * table[:, 3:]
+        after = solveh_banded(band, momenta.ravel(), lower=True, check_finite=False).reshape(before.shape)
+        forces = (self._inertia * after - momenta) / time_step
         vector, pull, turn = self._yade.vector, self._yade.omega.forces.setPermF, self._yade.omega.forces.setPermT
         for node, (x, y, z, a, b, c) in zip(self._ids, (forces + self._lift).tolist(), strict=True):
             pull(node, vector(x, y, z))
