@@ -131,6 +131,22 @@ WORM: dict[str, Any] = {
 }
 
 
+def resting() -> dict[str, float]:
+    """Distance of the ends of a worm that prefers a curvature of 100 1/m and was poured straight, and energies."""
+    engine = built({**WORM, "curvature_per_m": 100.0, "bending_time_s": 0.05}, gravity_m_per_s2=1e-6)
+    put(engine, (0.0, 0.0, 0.05))
+    filaments, _ = inside(engine)
+    added = engine.ledger.added
+    engine.advance(round(0.3 / engine.time_step))
+    points = filaments.points(0)
+    return {
+        "chord": float(np.linalg.norm(points[-1] - points[0])),
+        "added": added,
+        "damped": filaments.energies.damped,
+        "left": filaments.elastic_energy(),
+    }
+
+
 ELASTIC = {"friction_smarticle": 0.3, "friction_wall": 0.3, "restitution": 1.0}
 FINE = {"base": "reference", "stiffness_N_per_m": 10}
 

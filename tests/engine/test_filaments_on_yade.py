@@ -82,6 +82,16 @@ def test_a_free_filament_keeps_momentum_and_accounts_for_energy(simulate: Simula
     assert rows[-1, 8] > (0.5 if damped else 0.0) * energies[0]
 
 
+def test_a_filament_returns_to_the_curvature_that_it_prefers(simulate: Simulate) -> None:
+    found = simulate(filament_cases.resting)
+    # A polygon of ten sides that each turn by 0.3 rad.
+    assert found["chord"] == pytest.approx(0.003 * math.sin(1.5) / math.sin(0.15), rel=5e-3)
+    bent = WORM["young_modulus_Pa"] * math.pi * WORM["diameter_m"] ** 4 / 64 * 100**2 * 0.03 / 2
+    assert found["added"] == pytest.approx(bent, rel=1e-3)
+    assert found["damped"] == pytest.approx(bent, rel=2e-2)
+    assert found["left"] < 1e-3 * bent
+
+
 def test_drag_and_buoyancy_follow_their_formulas(simulate: Simulate) -> None:
     found = simulate(filament_cases.sinking)
     across = 4 * math.pi * 0.1 / (math.log(L / D) + 0.5)
