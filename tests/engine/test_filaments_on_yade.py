@@ -88,7 +88,7 @@ def test_a_filament_returns_to_the_curvature_that_it_prefers(simulate: Simulate)
     assert found["chord"] == pytest.approx(0.003 * math.sin(1.5) / math.sin(0.15), rel=5e-3)
     bent = WORM["young_modulus_Pa"] * math.pi * WORM["diameter_m"] ** 4 / 64 * 100**2 * 0.03 / 2
     assert found["added"] == pytest.approx(bent, rel=1e-3)
-    assert found["damped"] == pytest.approx(bent, rel=2e-2)
+    assert found["damped"] == pytest.approx(bent, rel=5e-2)  # of first order in the time step
     assert found["left"] < 1e-3 * bent
 
 
