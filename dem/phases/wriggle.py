@@ -21,6 +21,7 @@ class Wriggle(Part, TimedPhase):
     """
 
     bends: ClassVar[frozenset[str]] = frozenset({"filament"})
+    needs_links: ClassVar[str] = "active bending"
     type: Literal["wriggle"]
     duration_s: Duration = Field(..., description="length of the phase [s]")
     curvature_per_m: float = Field(..., ge=0, le=1e5, description="amplitude of the preferred curvature [1/m]")

@@ -104,8 +104,10 @@ def _of_bending(scene: SceneView, engine: str) -> Iterator[str]:
     if shapes == {""}:
         return
     bent = max(shapes)
-    if engine != "links":
-        yield f"particle: {bent} on engine: {engine}, whose bodies are rigid; use engine: links"
+    if engine == "yade" and bent == "filament":
+        yield from _of_nodes(scene)
+    elif engine != "links":
+        yield f"particle: {bent} on engine: {engine}, which has none; use engine: links"
     if len(shapes) > 1:
         yield f"particle: {bent}s and other shapes do not mix; use shapes that are all {bent}, or none of them"
     if scene.recording.contact_forces:
@@ -113,6 +115,23 @@ def _of_bending(scene: SceneView, engine: str) -> Iterator[str]:
     for index, phase in enumerate(scene.phases):
         if phase.kind == "take-over":
             yield f"phases.{index}: take-over reads runs of rigid bodies only; pour the {bent}s by 'deposit'"
+
+
+def _of_nodes(scene: SceneView) -> Iterator[str]:
+    """Yield an error for each part of a scene that filaments on YADE cannot have."""
+    lifted = (
+        f"phases.{index}.speed_m_per_s"
+        for index, phase in enumerate(scene.phases)
+        if isinstance(phase, RemoveContainer) and phase.speed_m_per_s is not None
+    )
+    edges = [*(["hooks"] if scene.hooks else []), *(["container.tiers"] if scene.cylinder.upper else []), *lifted]
+    for key in edges:
+        yield f"{key}: on engine: yade only the nodes of filaments touch boundaries, not edges; use engine: links"
+    if scene.recording.dissipation_interval_s is not None:
+        yield (
+            "recording.dissipation_interval_s: on engine: yade what contacts of filaments dissipate is not added up; "
+            "leave it out, or use engine: links"
+        )
 
 
 def _of_section(scene: SceneView) -> Iterator[str]:

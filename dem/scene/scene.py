@@ -393,13 +393,19 @@ class Scene(Part):
         # Rows have a meaning only across the wide side of a flat section; links of a chain have one.
         wide = normal > (self.fidelity.diameter_m or in_plane) and not bars.round and linkage is None
         rows = self.fidelity.rows if wide else 1
-        diameter = self._diameter_of(normal, in_plane, rows, disc=bars.round)
+        diameter, pitch = self._diameter_of(normal, in_plane, rows, disc=bars.round), self._pitch
         filament = None
-        if isinstance(shape, Flexible):
+        if isinstance(shape, Flexible):  # of cylinders on every engine
             filament = shape.filament(factor, None if self.liquid is None else self.liquid.immersing)
-        pitch = self._pitch * diameter
+            diameter, pitch = self.fidelity.diameter_m or in_plane, SMOOTH_PITCH
         return Kind(
-            name=shape.tag(), bars=bars, rows=rows, diameter=diameter, pitch=pitch, filament=filament, linkage=linkage
+            name=shape.tag(),
+            bars=bars,
+            rows=rows,
+            diameter=diameter,
+            pitch=pitch * diameter,
+            filament=filament,
+            linkage=linkage,
         )
 
     @property

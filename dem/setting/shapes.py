@@ -302,7 +302,7 @@ class Free(Shaped):
 
 
 class Flexible(Shaped):
-    """A round filament that stretches, bends and twists, on the engine links."""
+    """A round filament that stretches, bends and twists, on the engines links and yade."""
 
     shape: Literal["filament"]
     length_m: Length = Field(..., description="length along its axis; round caps reach beyond [m]")

@@ -103,7 +103,22 @@ class Assembly:
         bodies = self._yade.omega.bodies
         self._states = [bodies[body].state for body in self._ids]
 
-    def add(self, poses: Poses, *, speed: float = 0.0) -> None:
+    @property
+    def weight_shares(self) -> Array:
+        """(N,) weight less buoyancy, over weight, of each body [1]."""
+        return np.ones(self.count)
+
+    @property
+    def bonded(self) -> bool:
+        """Whether some of YADE's interactions are bonds, not contacts."""
+        return self.hinges is not None
+
+    def elastic_energy(self) -> float:
+        """Return the elastic energy of all bonds [J]."""
+        return 0.0 if self.hinges is None else self.hinges.elastic_energy()
+
+    def add(self, poses: Poses, *, speed: float = 0.0) -> float:
+        """Add bodies at poses, falling at a speed [m/s]; return the elastic energy that they have by then [J]."""
         omega, still, falling = self._yade.omega, np.zeros(3), np.array([0.0, 0.0, -speed])
         self._kinds += [] if poses.kinds is None else poses.kinds.tolist()
         for position, rotation in zip(poses.positions, poses.rotations, strict=True):
@@ -127,10 +142,11 @@ class Assembly:
                 angular_momentum=still,
             )
         if isinstance(self._model, Mixture):
-            return
+            return 0.0
         new, boxes = len(poses.positions), self._model.boxes
         self._arms = np.concatenate([self._arms, np.tile(boxes.link_centres, (new, 1, 1))])
         self._turns = np.concatenate([self._turns, np.tile(boxes.link_rotations, (new, 1, 1, 1))])
+        return 0.0
 
     def state(self) -> State:
         """Return the state of a pile of smarticles."""

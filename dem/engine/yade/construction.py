@@ -13,7 +13,10 @@ from dem.engine.yade.hinges import HINGE_MATERIAL, HingeLaw
 from dem.engine.yade.library import Yade
 from dem.physics.contact import ContactLaw
 
-SMARTICLE_MATERIAL, WALL_MATERIAL = "smarticle", "wall"
+SMARTICLE_MATERIAL, WALL_MATERIAL, SEGMENT_MATERIAL = "smarticle", "wall", "segment"
+# Masks, of which two bodies need a common bit to touch: nodes of filaments touch floor and wall, and segments touch
+# segments. Nodes have the one bit within which YADE lets bodies of equal masks not touch.
+OF_SEGMENTS, OF_NODES, OF_BOUNDARIES = 1, 2, 6
 
 ORDER = ("ForceResetter", "InsertionSortCollider", "InteractionLoop", "HarmonicMotionEngine", "NewtonIntegrator")
 """Order of YADE's engines in a step: forces of contacts, velocity of the container, motion of all bodies."""
@@ -51,6 +54,20 @@ ADDS: Mapping[EffectName, Adds] = {
         shapes=("GridNode",),
         python="while articulated three bodies and four bonds per smarticle; a shorter time step throughout",
     ),
+    EffectName.FILAMENTS: Adds(
+        functors=(
+            "Bo1_GridConnection_Aabb",
+            "Ig2_GridNode_GridNode_GridNodeGeom6D",
+            "Ig2_GridConnection_GridConnection_GridCoGridCoGeom",
+            "Ip2_CohFrictMat_CohFrictMat_CohFrictPhys",
+            "Ip2_FrictMat_FrictMat_FrictPhys",
+            "Law2_ScGeom6D_CohFrictPhys_CohesionMoment",
+            "Law2_GridCoGridCoGeom_FrictPhys_CundallStrack",
+        ),
+        materials=(HINGE_MATERIAL, SEGMENT_MATERIAL),
+        shapes=("GridNode", "GridConnection"),
+        python="internal damping and drag of all nodes in every step",
+    ),
     EffectName.MOTORS: Adds(python="two readings per smarticle and control update"),
     EffectName.HOOKS: Adds(
         functors=("Bo1_Box_Aabb", "Ig2_Box_Sphere_ScGeom"),
@@ -82,7 +99,10 @@ def add_materials(yade: Yade, adds: Adds, law: ContactLaw) -> None:
     wall = 1 / (1 / law.wall_damping - 1 / between) if law.wall_damping else 0.0
     dampings = {SMARTICLE_MATERIAL: between, WALL_MATERIAL: wall}
     for label in adds.materials:
-        if label == HINGE_MATERIAL:
+        if label == SEGMENT_MATERIAL:
+            # `add_engines` sets the stiffness of contacts of segments.
+            material = yade.classes.FrictMat(density=0, frictionAngle=math.atan(law.friction), label=label)
+        elif label == HINGE_MATERIAL:
             # Each bond gets a stiffness of its own; the material only selects YADE's law for bonds.
             material = yade.classes.CohFrictMat(density=0, young=1, poisson=0, isCohesive=False, label=label)
         else:
@@ -117,12 +137,16 @@ def add_engines(
         "Ip2_ViscElMat_ViscElMat_ViscElPhys": {"frictAngle": friction},
         # YADE's correction for sliding spheres would be wrong for nodes, which do not touch.
         "Ig2_GridNode_GridNode_GridNodeGeom6D": {"avoidGranularRatcheting": False},
-        "Law2_ScGeom6D_CohFrictPhys_CohesionMoment": {
-            "useIncrementalForm": True,
-            "shear_creep": True,
-            "creep_viscosity": 0.0 if hinges is None else hinges.damper_viscosity,
+        # Moments of filaments follow from the orientations of their nodes, without drift.
+        "Law2_ScGeom6D_CohFrictPhys_CohesionMoment": {"useIncrementalForm": False}
+        if hinges is None
+        else {"useIncrementalForm": True, "shear_creep": True, "creep_viscosity": hinges.damper_viscosity},
+        "Ip2_FrictMat_FrictMat_FrictPhys": {
+            "kn": classes.MatchMaker(algo="val", val=law.normal_stiffness),
+            "ks": classes.MatchMaker(algo="val", val=law.tangential_stiffness),
         },
-        "InsertionSortCollider": {"verletDist": VERLET_DISTANCE * radius},
+        "InsertionSortCollider": {"verletDist": VERLET_DISTANCE * radius}
+        | ({"avoidSelfInteractionMask": OF_NODES, "targetInterv": -1} if SEGMENT_MATERIAL in adds.materials else {}),
         "HarmonicMotionEngine": {"dead": True},
         "NewtonIntegrator": {"damping": 0, "gravity": yade.vector(0, 0, -gravity), "exactAsphericalRot": True},
     }

@@ -16,10 +16,12 @@ from dem.physics.overlaps import APART, Held, Overlaps, held_between
 
 
 def contacts_of(yade: Yade, assembly: Assembly) -> Iterator[Any]:
-    """Yield YADE's interactions that are contacts; the others are bonds of hinges."""
-    smarticle_of = assembly.smarticle_of
+    """Yield YADE's interactions that are contacts; the others are bonds of hinges or filaments."""
+    smarticle_of, bond = assembly.smarticle_of, yade.classes.CohFrictPhys
     for interaction in yade.omega.interactions:
-        if interaction.isReal and (interaction.id1 in smarticle_of or interaction.id2 in smarticle_of):
+        if not interaction.isReal or (assembly.bonded and isinstance(interaction.phys, bond)):
+            continue
+        if interaction.id1 in smarticle_of or interaction.id2 in smarticle_of:
             yield interaction
 
 
@@ -63,9 +65,8 @@ def measure_overlaps(
     yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, law: ContactLaw, limit: float
 ) -> Overlaps:
     """Return the present overlaps; `Overlaps.deep` marks bodies with an overlap above `limit` [m]."""
-    hinges = assembly.hinges
-    # Called often: without hinges all interactions are contacts, so that their bodies need not be looked up.
-    contacts = contacts_of(yade, assembly) if hinges is not None else (c for c in yade.omega.interactions if c.isReal)
+    # Called often: without bonds all interactions are contacts, so that their bodies need not be looked up.
+    contacts = contacts_of(yade, assembly) if assembly.bonded else (c for c in yade.omega.interactions if c.isReal)
     depths = np.array([contact.geom.penetrationDepth for contact in contacts])
     deepest = float(depths.max(initial=0.0))
     deep = np.zeros(assembly.count, dtype=np.bool_)
@@ -80,7 +81,7 @@ def measure_overlaps(
     # Friction bounds the energy of tangential springs by that of normal springs.
     friction = max(law.friction, law.wall_friction)
     tangential = friction**2 * law.normal_stiffness / law.tangential_stiffness * normal
-    return Overlaps(deepest, deep, normal + tangential + (0.0 if hinges is None else hinges.elastic_energy()), held)
+    return Overlaps(deepest, deep, normal + tangential + assembly.elastic_energy(), held)
 
 
 def _held(yade: Yade, assembly: Assembly, boundaries: YadeBoundaries, deep: Flags, least: float) -> tuple[Held, ...]:

@@ -16,7 +16,8 @@ from dem.engine.interface import Saved
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.boundaries import YadeBoundaries
 from dem.engine.yade.construction import ADDS, add_engines, add_materials
-from dem.engine.yade.contacts import contact_forces, measure_overlaps
+from dem.engine.yade.contacts import contact_forces, contacts_of, measure_overlaps
+from dem.engine.yade.filaments import YadeFilaments
 from dem.engine.yade.hinges import HingeLaw
 from dem.engine.yade.ledger import YadeLedger
 from dem.engine.yade.library import load_yade, rows_of
@@ -73,7 +74,6 @@ class YadeEngine:
         self.cylinder = cylinder
         self.cpu_elsewhere = 0.0
         self.gravity = gravity
-        self._assembly = Assembly(self._yade, particle, hinge_law, planar=channel is not None, strengths=strengths)
         self._smarticle_seconds = 0.0
         self._thrown = 0.0
         # (step, value) of the unbalanced force at loading, since YADE does not save forces.
@@ -84,17 +84,24 @@ class YadeEngine:
             EffectName.CONTAINER_MOTION: shaken,
             EffectName.ARTICULATION: hinge_law is not None,
             EffectName.HOOKS: hooks is not None,
+            EffectName.FILAMENTS: isinstance(particle, Mixture) and particle.flexible,
         }
         adds = Adds.together(ADDS[effect] for effect, on in called_for.items() if on)
         add_materials(self._yade, adds, law)
         self.boundaries = YadeBoundaries(self._yade, cylinder, hooks, channel)
+        self.filaments: YadeFilaments | None = None
+        if isinstance(particle, Mixture) and particle.flexible:
+            self.filaments = YadeFilaments(self._yade, particle, gravity, self.boundaries.container)
+        self._assembly = self.filaments or Assembly(
+            self._yade, particle, hinge_law, planar=channel is not None, strengths=strengths
+        )
         self.ledger = YadeLedger(
             self._yade, self._assembly, self.boundaries, works=track_work, dissipation_interval=dissipation_interval
         )
         self.boundaries.book_removal = self.ledger.book_removal
         self.motors = YadeMotors(self._yade, self._assembly, self.ledger, motor_law, strengths)
         self.strings = YadeStrings(self._yade, self._assembly)
-        self.filaments = self.grips = None
+        self.grips = None
         add_engines(self._yade, adds, law, hinges=hinge_law, gravity=gravity, radius=particle.radius)
         self.set_time_step(time_step)
         self.boundaries.bind()
@@ -174,12 +181,14 @@ class YadeEngine:
         if steps <= 0:
             return
         step, target, measured = self._omega.step, self.steps + steps, bool(self.boundaries.measured)
-        tied = self.strings.tied
+        tied, filaments = self.strings.tied, self.filaments
         # One call per step costs 1 µs; YADE's own loop runs in the background and would have to be polled. Ctrl-C
         # arrives between two steps.
         for number in range(self.steps + 1, target + 1):
             if tied:
                 self.ledger.container_work += self.strings.pull(self.time_step)
+            if filaments is not None:
+                filaments.resist(self.time_step)
             self.ledger.step(number, step)
             if measured:
                 self.boundaries.sum_forces()
@@ -188,24 +197,29 @@ class YadeEngine:
         if self.steps != target:
             msg = f"YADE stopped at step {self.steps} of {target} (t = {self.time:.4f} s); see its message above"
             raise RunError(msg)
-        self._smarticle_seconds += steps * self.time_step * float(self._relative_masses.sum())
+        self._smarticle_seconds += steps * self.time_step * float(self._relative_weights.sum())
 
     @property
     def count(self) -> int:
         return self._assembly.count
 
     def add(self, poses: Poses, *, speed: float = 0.0) -> None:
-        self._assembly.add(poses, speed=speed)
+        self.ledger.added += self._assembly.add(poses, speed=speed)
         mass, heights = self.particle.mass, poses.positions[:, 2]
-        relative = self._relative_masses[-len(heights) :] if len(heights) else np.zeros(0)
-        new = float(relative.sum())
-        self.ledger.added += mass * (self.gravity * float((relative * heights).sum()) + new * speed**2 / 2)
+        first = self.count - len(heights)
+        new, weights = float(self._relative_masses[first:].sum()), self._relative_weights[first:]
+        self.ledger.added += mass * (self.gravity * float((weights * heights).sum()) + new * speed**2 / 2)
         self._thrown += mass * new * speed
 
     @property
     def _relative_masses(self) -> Array:
         """(N,) masses of the bodies, over the mean mass of the scene's bodies [1]; exactly 1 for smarticles."""
         return self._assembly.masses / self.particle.mass
+
+    @property
+    def _relative_weights(self) -> Array:
+        """(N,) weights, less buoyancy, of the bodies, over the mean full weight of the scene's bodies [1]."""
+        return self._relative_masses * self._assembly.weight_shares
 
     def still(self) -> None:
         self.ledger.dissipated += self.state().kinetic_energy
@@ -234,7 +248,7 @@ class YadeEngine:
     def touches(self) -> Numbers:
         # Contacts of spheres are counted one by one.
         smarticle_of = self._assembly.smarticle_of
-        bodies = (body for i in self._omega.interactions if i.isReal for body in (i.id1, i.id2))
+        bodies = (body for i in contacts_of(self._yade, self._assembly) for body in (i.id1, i.id2))
         owners = [smarticle_of[body] for body in bodies if body in smarticle_of]
         return np.bincount(np.array(owners, dtype=np.int64), minlength=self.count)
 
@@ -254,6 +268,8 @@ class YadeEngine:
             return self._loaded[1]
         if not self.count or not self.gravity:
             return math.inf
+        if self.filaments is not None:
+            return self.filaments.mean_unbalanced()
         weight, relative = self.particle.mass * self.gravity, self._relative_masses
         forces = rows_of(map(self._omega.forces.f, self._assembly.bodies)).reshape(self.count, -1, 3).sum(axis=1)
         forces[:, 2] -= weight * relative

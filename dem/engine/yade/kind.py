@@ -6,11 +6,18 @@ from dem.engine.yade.construction import ADDS, ORDER
 from dem.engine.yade.engine import YadeEngine
 from dem.engine.yade.hinges import DAMPER_TIME, HingeLaw
 from dem.engine.yade.library import yade_threads, yade_version
-from dem.engine.yade.stable_step import hinged_stable_time_step, planar_stable_time_step, stable_time_step
+from dem.engine.yade.stable_step import (
+    filament_stable_time_step,
+    hinged_stable_time_step,
+    planar_stable_time_step,
+    stable_time_step,
+)
 
 # Wall seconds per sphere and step in a dense pile, one core, measured with `make bench` (see README); machines
 # differ by a factor of two.
 COST_PER_SPHERE_STEP = 3.3e-7
+# The same per node of a filament and step, most of it for internal damping in Python.
+COST_PER_NODE_STEP = 7e-6
 # Factors on this cost. A pour costs about half as much as the full pile, since the pile grows from nothing; with motors
 # each smarticle has three bodies and four bonds, and there are control updates.
 FACTORS = {Activity.POUR: 0.5, Activity.ACTUATE: 1.7}
@@ -32,6 +39,9 @@ class YadeKind:
         law = contact_law_of(scene)
         if articulated and scene.channel is not None:
             return planar_stable_time_step(scene.particle, law, hinge_law(scene), scene.pulled_by)
+        rods = [body.filament for body in scene.bodies if body.filament is not None]
+        if rods:
+            return min(filament_stable_time_step(rod, law) for rod in rods)
         stable = min(stable_time_step(body, law) for body in scene.bodies)
         if articulated:
             stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
@@ -39,6 +49,10 @@ class YadeKind:
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         per_step = COST_PER_SPHERE_STEP * mean_spheres(scene) * scene.count
+        if scene.mixture is not None and scene.mixture.flexible:
+            per_step = (
+                COST_PER_NODE_STEP * scene.mixture.mean([1.0 + size for size in scene.mixture.sizes]) * scene.count
+            )
         return per_step / time_step * FACTORS.get(activity, 1.0)
 
     def seconds_to_compile(self, scene: Demand) -> float:

@@ -122,8 +122,7 @@ class YadeLedger:
             self.container_work += self._boundaries.power() * self._time_step
 
     def elastic(self) -> tuple[float, float]:
-        hinges = self._assembly.hinges
-        return self._contacts({}).elastic_energy, 0.0 if hinges is None else hinges.elastic_energy()
+        return self._contacts({}).elastic_energy, self._assembly.elastic_energy()
 
     def take_in(self) -> None:
         self.added += self.elastic()[0]

@@ -94,7 +94,7 @@ def test_a_plan_has_their_step_and_effects() -> None:
 
 
 @pytest.mark.parametrize(("changes", "message"), [
-    ({"engine": "yade"}, "particle: chain on engine: yade, whose bodies are rigid; use engine: links"),
+    ({"engine": "yade"}, "particle: chain on engine: yade, which has none; use engine: links"),
     ({"particle.link_m": 0}, "particle.link_m.0: 0 is out of range"),
     ({"particle.link_m": [0.01, 0.01]}, "particle.shape: chain: link_m: 2 lengths for links: 4; give one for all"),
     ({"particle.links": 1}, "particle.links: 1 is out of range; use at least 2"),

@@ -1,5 +1,6 @@
 """Reading scenes of filaments: what they become, and what is refused in one line."""
 
+import copy
 from typing import Any
 
 import pytest
@@ -74,8 +75,8 @@ def test_a_plan_has_their_step_and_effects() -> None:
 
 
 @pytest.mark.parametrize(("changes", "message"), [
-    ({"engine": "yade"}, "particle: filament on engine: yade, whose bodies are rigid; use engine: links"),
-    ({"engine": "lammps"}, "particle: filament on engine: lammps, whose bodies are rigid; use engine: links"),
+    ({"engine": "yade"}, "phases.1 (wriggle): active bending: only engine: links computes that"),
+    ({"engine": "lammps"}, "particle: filament on engine: lammps, which has none; use engine: links"),
     ({"particle.segments": 60}, "particle.shape: filament: bar 0: 0.0005 m long; make it longer than its thickness"),
     ({"particle.young_modulus_Pa": -1}, "particle.young_modulus_Pa: -1 is out of range; use at least 1"),
     ({"particle": {**WORM, "thickness_in_plane_m": 1e-3}}, "particle.diameter_m: a round section has no thicknesses"),
@@ -95,4 +96,32 @@ def test_a_plan_has_their_step_and_effects() -> None:
 def test_one_line_says_what_is_wrong_and_what_to_do(changes: dict[str, Any], message: str) -> None:
     found = refused(changes)
     assert found.startswith(message)
+    assert "\n" not in found
+
+
+PASSIVE = {"engine": "yade", "phases": [POUR, {"type": "shake", "duration_s": 0.1, "frequency_hz": 30}]}
+
+
+def test_yade_computes_passive_filaments() -> None:
+    scene = small({**BLOB, **PASSIVE})
+    found = plan(scene)
+    assert found.time_step_s < found.stable_time_step_s < 1e-3
+    # Well below the limit of stretching alone, √2 over its highest frequency.
+    filament = scene.bodies[0].filament
+    assert filament is not None
+    assert found.stable_time_step_s < (2 / filament.stiffest[0]) ** 0.5
+
+
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"phases.1": WRIGGLE}, "phases.1 (wriggle): active bending: only engine: links computes that"),
+    ({"phases.1": LIFT}, "phases.1 (lift): a grip: only engine: links computes that"),
+    ({"phases.1": {"type": "remove-container", "duration_s": 0.1, "speed_m_per_s": 0.1}},
+     "phases.1.speed_m_per_s: on engine: yade only the nodes of filaments touch boundaries, not edges"),
+    ({"hooks": {"lower_height_m": 0.003, "upper_height_m": 0.006}}, "hooks: on engine: yade only the nodes"),
+    ({"recording": {"dissipation_interval_s": 2e-3}}, "recording.dissipation_interval_s: on engine: yade"),
+])  # fmt: skip
+def test_one_line_says_what_filaments_on_yade_do_not_have(changes: dict[str, Any], message: str) -> None:
+    found = refused(copy.deepcopy(PASSIVE) | changes)
+    assert found.startswith(message)
+    assert "engine: links" in found
     assert "\n" not in found
