@@ -1,4 +1,4 @@
-"""Read and plan random scenes, and call random command lines: `python -m validation.fuzz --scenes 100000 --lines 20000`.
+"""Try random scenes and command lines: `python -m validation.fuzz --scenes 100000 --lines 20000 --out DIR`.
 
 Scenes are shipped ones, of all shapes, with values put anywhere, keys dropped, added, nested and taken from other
 scenes; some are files that are cut anywhere. Command lines have real files and options with good and bad values, but
@@ -78,7 +78,8 @@ def shipped_scenes() -> list[dict[str, Any]]:
     blocks = [load_yaml(text) for page in pages for text in re.findall(r"```yaml\n(# \S+: .*?)```", page, re.DOTALL)]
     return [
         *(yaml.safe_load(dump_scene(scene)) for scene in scenes),
-        *(block for block in blocks if isinstance(block, dict) and "phases" in block),
+        # A scene that takes over the end of another run needs this run.
+        *(block for block in blocks if "phases" in block and block["phases"][0]["type"] != "take-over"),
     ]
 
 
@@ -145,7 +146,10 @@ class Scenes:
                 return data
             *above, last = rng.choice(found)
             parent = value_at(data, above)
-            value, what = parent[last], rng.choice(["put", "scale", "near", "near", "drop", "add", "nest", "twice", "of"])
+            value, what = (
+                parent[last],
+                rng.choice(["put", "scale", "near", "near", "drop", "add", "nest", "twice", "of"]),
+            )
             number = isinstance(value, int | float) and not isinstance(value, bool)
             if what == "drop":
                 del parent[last]
@@ -242,10 +246,35 @@ class Lines:
         self.paths = [*FILES, "empty", "sweep", "absent", "new", "sweep/runs/n5_1", *(run.name for run in runs)] + [
             f"{run.name}/{name}" for run in runs for name in ("series.h5", "run.json", "frames", "scene.yaml")
         ]
-        self.outputs = ["new.png", "new.gif", "new.csv", "new.html", "new.glb", "new.gsd", "new.vtp", "new", "a/b/c.png"]
+        self.outputs = [
+            "new.png",
+            "new.gif",
+            "new.csv",
+            "new.html",
+            "new.glb",
+            "new.gsd",
+            "new.vtp",
+            "new",
+            "a/b/c.png",
+        ]
         self.words = [
             *(text for text in TEXTS if "\x00" not in text and "\ud800" not in text),
-            *("1", "0", "-1", "0.5", "nan", "inf", "1e400", "9" * 5000, "1,2", "1:2", "run", "count=3", "phases.1=", "="),
+            *(
+                "1",
+                "0",
+                "-1",
+                "0.5",
+                "nan",
+                "inf",
+                "1e400",
+                "9" * 5000,
+                "1,2",
+                "1:2",
+                "run",
+                "count=3",
+                "phases.1=",
+                "=",
+            ),
             *("fidelity=draft", "particle={shape: rod, length_m: 0.01}", "phases.0.type=lift", "speed", "top", "01:00"),
             *("phases.9.x=1", "x.y.z=[", "seed=1e9", "linking", "crossing-number", "theta", "count", "last", "gravish"),
             *("--", "-", "-x", "--help", "--debug", "--=", "@x", "~", "*"),
@@ -275,12 +304,13 @@ class Lines:
     def _value(self, rng: random.Random, action: argparse.Action) -> str:
         if rng.random() < 0.1:
             return rng.choice(self.words)
-        if action.choices:
+        if action.choices and action.dest != "name":
             return str(rng.choice(list(action.choices)))
         if action.type is Path or action.dest in ("cluster",):
             new = action.dest in ("out", "output", "table") and rng.random() < 0.7
             return rng.choice(self.outputs if new else self.paths)
         if action.dest == "name":
+            # Of the studies the smallest: before its first run, `study` expands whole sweeps.
             return rng.choice(["gravish", "gravish-x", "motor", "shake", *self.words])
         if action.dest == "size":
             return rng.choice(["64", "64x80", "0", "1x1", "100000", "99999999x1", "1"])
@@ -318,7 +348,12 @@ def nothing_started() -> Iterator[None]:
         raise KeyboardInterrupt
 
     with ExitStack() as stack:
-        for target in ("dem.run.run.run_scene", "templates.local.run_folder", "postprocess.view.view_run", "time.sleep"):
+        for target in (
+            "dem.run.run.run_scene",
+            "templates.local.run_folder",
+            "postprocess.view.view_run",
+            "time.sleep",
+        ):
             stack.enter_context(mock.patch(target, stopped))
         stack.enter_context(mock.patch.object(subprocess, "Popen", Absent))
         yield
@@ -329,21 +364,24 @@ def nothing_started() -> Iterator[None]:
 
 @contextmanager
 def limited(seconds: float, size: int) -> Iterator[None]:
-    """Raise LateError after some processor time [s], and MemoryError after some more memory [B]."""
+    """Raise LateError after some processor time [s], and MemoryError after some more memory [B].
+
+    Sweeps limit their own time by the other timer, ITIMER_VIRTUAL.
+    """
 
     def late(*_: object) -> None:
         raise LateError(f"took more than {seconds:g} s of processor time")
 
-    before, limits = signal.signal(signal.SIGVTALRM, late), resource.getrlimit(resource.RLIMIT_AS)
+    before, limits = signal.signal(signal.SIGPROF, late), resource.getrlimit(resource.RLIMIT_AS)
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + size, limits[1]))
-    signal.setitimer(signal.ITIMER_VIRTUAL, seconds, seconds)  # again, should a handler swallow it
+    signal.setitimer(signal.ITIMER_PROF, seconds, seconds)  # again, should a handler swallow it
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_VIRTUAL, 0)
+        signal.setitimer(signal.ITIMER_PROF, 0)
         resource.setrlimit(resource.RLIMIT_AS, limits)
-        signal.signal(signal.SIGVTALRM, before)
+        signal.signal(signal.SIGPROF, before)
 
 
 @dataclass
@@ -418,7 +456,9 @@ def fuzz_lines(count: int, seed: int, out: Path, runs: Sequence[Path]) -> Tally:
             write_files(folder, runs)
         rng = random.Random(f"line {seed} {number}")
         words = lines.draw(rng)
-        (out / "last.txt").write_text(repr(words), encoding="utf-8", errors="replace")  # names what ends this process
+        (out / "last.txt").write_text(
+            f"{number} {words!r}", encoding="utf-8", errors="replace"
+        )  # names what ends this process
         with chdir(folder), nothing_started():
             tally.call(lambda words=words: check_line(words), repr(words))  # type: ignore[misc]
     return tally
@@ -440,7 +480,9 @@ def fuzz(arguments: Sequence[str] | None = None) -> int:
         if count:
             out = given.out.resolve() / what
             out.mkdir(parents=True, exist_ok=True)
-            tally = fuzz_scenes(count, given.seed, out) if what == "scenes" else fuzz_lines(count, given.seed, out, runs)
+            tally = (
+                fuzz_scenes(count, given.seed, out) if what == "scenes" else fuzz_lines(count, given.seed, out, runs)
+            )
             print(f"{count} {what}: {tally}", *(f"{n} × {key}" for key, n in tally.failures.most_common()), sep="\n")
             failed += tally.failures.total()
     return int(failed > 0)

@@ -111,7 +111,7 @@ def in_use(out: Path) -> bool:
 class _LogFile(logging.FileHandler):
     """Log file that drops what a full disk cannot hold; `logging` would print a traceback for each line."""
 
-    def handleError(self, record: logging.LogRecord) -> None:  # noqa: D102, N802 - of the base class
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - of the base class
         if not isinstance(sys.exc_info()[1], OSError):
             super().handleError(record)
 

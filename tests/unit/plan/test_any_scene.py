@@ -8,7 +8,6 @@ import gc
 import json
 import math
 import os
-import re
 import resource
 import signal
 import time
@@ -27,16 +26,11 @@ from scenes import CHAIN, SMALL, changed, small
 
 from dem.errors import InputError
 from dem.plan.outlook import plan
-from dem.scene.reading import dump_scene, json_schema, parse_scene
-from dem.yaml_text import load_yaml
+from dem.scene.reading import json_schema
 from smarticles.commands.run import read_scene
-from smarticles.starters import KINDS, starter
-from studies.registry import STUDIES
-from templates.sweep.expand import expand
-from templates.sweep.sweep_file import load_sweep
+from validation.fuzz import places, scaled, shipped_scenes, value_at
 
 # As many as 20 s are enough for on a busy machine; 0.01 s each, and what hypothesis itself takes.
-PAGES = Path(__file__).resolve().parents[3] / "docs" / "how-to"
 TRIED = int(os.environ.get("ANY_SCENES", "200"))
 MOST_S = 1.0  # of processor time
 MOST_BYTES = 2**30
@@ -48,25 +42,16 @@ ENOUGH = settings(
     database=None,
 )
 
-Place = tuple[str | int, ...]
-
 
 def shipped() -> list[dict[str, Any]]:
-    """Scenes of all shipped sweeps and starters, every default written out, and scenes that leave most of them out."""
-    sweeps = [study.sweep_file(quick=True) for study in STUDIES.values() if getattr(study, "quick", True)]
-    assert len(sweeps) > 5
-    points = [point for sweep in sweeps for point in expand(load_sweep(sweep))[::9]]
+    """Scenes of sweeps, starters and pages, and small ones that leave most keys out."""
     sine = {"type": "sine", "centre_deg": 90, "amplitude_deg": 5, "frequency_hz": 3}
     ramp = {"type": "ramp", "to_deg": 0, "duration_s": 0.5}
     swings = {"type": "sequence", "steps": [ramp, {"type": "return", "duration_s": 0.5}], "repeat": 3}
     both = {"type": "actuate", "barb_1": sine, "barb_2": swings, "duration_s": 2}
     tiers = [{"radius_m": 0.0234, "height_m": 0.05}, {"radius_m": 0.02, "height_m": 0.1}]
-    starters = [parse_scene(load_yaml(starter(kind)), source=kind) for kind in KINDS]
-    pages = [path.read_text(encoding="utf-8") for path in sorted(PAGES.glob("*.md"))]
-    blocks = [load_yaml(block) for page in pages for block in re.findall(r"```yaml\n(# \S+\.yaml: .*?)```", page, re.DOTALL)]
     return [
-        *(yaml.safe_load(dump_scene(scene)) for scene in [*(point.scene for point in points), *starters]),
-        *(block for block in blocks if "phases" in block),
+        *shipped_scenes(),
         *(SMALL, CHAIN),
         changed(SMALL, {"phases.1": both, "phases.2": {"type": "internal-oscillation", "theta_deg": 10}}),
         changed(SMALL, {"hooks": {}, "phases.2": {"type": "pull-hook"}}),
@@ -99,28 +84,6 @@ ANYTHING = st.recursive(
 
 
 KEYS = sorted({key for part in [SCHEMA, *SCHEMA["$defs"].values()] for key in part.get("properties", {})})
-
-
-def places(data: Any, here: Place = ()) -> Iterator[Place]:
-    """The places of all values below."""
-    for key, value in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
-        yield (*here, key)
-        yield from places(value, (*here, key))
-
-
-def value_at(data: Any, place: Place) -> Any:
-    for step in place:
-        data = data[step]
-    return data
-
-
-def scaled(value: float, factor: float) -> float:
-    """The value times a factor, of its own type where that holds it; as it is where no number does."""
-    try:
-        product = value * factor
-    except OverflowError:  # whole numbers of Python have any length
-        return value
-    return type(value)(product) if math.isfinite(product) else product
 
 
 @st.composite
@@ -162,7 +125,7 @@ SHAPED = [scene for scene in SHIPPED if scene.get("particle")]
 
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
-    """Stops what takes more processor time, or 1 GiB more memory: a search that never ends must not hold up the tests."""
+    """Stops what takes more processor time or memory: a search that never ends must not hold up the tests."""
 
     def late(*_: object) -> None:
         msg = f"still at it after {seconds:g} s of processor time"
