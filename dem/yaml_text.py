@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from dem.errors import InputError
+from dem.errors import InputError, shown
 
 # YAML 1.1 takes 1e-3 and 5E2 for text; YAML 1.2 takes them for numbers, as their writers do.
 _FLOAT = re.compile(
@@ -39,10 +39,10 @@ class StrictLoader(yaml.SafeLoader):  # type: ignore[misc]  # PyYAML ships no ty
             for key_node, _ in node.value:
                 key = self.construct_object(key_node, deep=True)
                 try:
-                    problem = f"key {key!r} is given twice; keep one of the two" if key in seen else ""
+                    problem = f"key {shown(key)} is given twice; keep one of the two" if key in seen else ""
                     seen.add(key)
                 except TypeError:
-                    problem = f"a key must be plain text or a number: got {key!r}"
+                    problem = f"a key must be plain text or a number: got {shown(key)}"
                 if problem:
                     raise yaml.constructor.ConstructorError(None, None, problem, key_node.start_mark)
         mapping: dict[Any, Any] = super().construct_mapping(node, deep=deep)

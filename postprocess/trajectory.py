@@ -51,23 +51,29 @@ def capsules_of(frame: Frame, run: Run) -> Capsules:
 
 
 def orientations(directions: Floats) -> Floats:
-    """Return unit quaternions (P, 4), real part first, that turn the x axis along directions (P, 3)."""
+    """Return unit quaternions (P, 4), real part first, that turn the z axis along directions (P, 3)."""
     unit = directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-300)
-    unit = np.where(unit[:, :1] < 0, -unit, unit)  # a capsule has no head
+    unit = np.where(unit[:, 2:] < 0, -unit, unit)  # a capsule has no head
     x, y, z = unit.T
-    turned = np.column_stack([1 + x, np.zeros_like(x), -z, y])
+    turned = np.column_stack([1 + z, -y, x, np.zeros_like(z)])
     return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
 
 
 def shapes_of(capsules: Capsules) -> list[dict[str, Any]]:
-    """Return the shape of each type as GSD describes it: along x, with the mean length of its capsules."""
+    """Return the shape of each type as GSD describes it, with the mean length of its capsules.
+
+    Capsules are along z, since OVITO opens no files with polyhedra along other axes; without length they are spheres.
+    """
     lengths = np.linalg.norm(capsules.ends[:, 1] - capsules.ends[:, 0], axis=1)
     shapes = []
     for number, radius in enumerate(capsules.radii):
         own = lengths[capsules.type_of == number]
         half = float(own.mean()) / 2 if len(own) else 0.0
-        vertices = [[-half, 0.0, 0.0], [half, 0.0, 0.0]] if half > 0 else [[0.0, 0.0, 0.0]]
-        shapes.append({"type": "ConvexPolyhedron", "rounding_radius": float(radius), "vertices": vertices})
+        if half > 0:
+            vertices = [[0.0, 0.0, -half], [0.0, 0.0, half]]
+            shapes.append({"type": "ConvexPolyhedron", "rounding_radius": float(radius), "vertices": vertices})
+        else:
+            shapes.append({"type": "Sphere", "diameter": 2 * float(radius)})
     return shapes
 
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from templates.sweep.folder import Entry, Folder
     from templates.sweep.sweep_file import Sweep
 
+MOST_CAUSES = 5  # of failed runs in an error; more would hide what to do
+
 
 def make_folder(file: Path, out: Path, command: str) -> Folder:
     """Write the scenes of a sweep file to a directory that may hold this sweep already; return it.
@@ -96,10 +98,12 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
 
 
 def raise_failures(folder: Folder, outcomes: Sequence[Outcome]) -> None:
-    """Raise RunError if any outcome is not a finished run; the message lists these runs and the causes."""
+    """Raise RunError if any outcome is not a finished run; the message lists the first of these and the causes."""
     failed = [outcome for outcome in outcomes if outcome.missing]
     if failed:
-        causes = "; ".join(f"{outcome.name}: {outcome.cause}" for outcome in failed)
+        causes = "; ".join(f"{outcome.name}: {outcome.cause}" for outcome in failed[:MOST_CAUSES])
+        if len(failed) > MOST_CAUSES:
+            causes += f"; {len(failed) - MOST_CAUSES} more, see smarticles status {folder.path}"
         raise RunError(
             f"{folder.path}: {len(failed)} of {len(outcomes)} runs are missing: {causes}; "
             f"logs are in {folder.path / 'logs'}, start them again: smarticles resume {folder.path}"

@@ -3,8 +3,9 @@
 import fcntl
 import logging
 import os
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
@@ -103,17 +104,26 @@ def in_use(out: Path) -> bool:
     return False
 
 
+class _LogFile(logging.FileHandler):
+    """Log file that drops what a full disk cannot hold; `logging` would print a traceback for each line."""
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - of the base class
+        if not isinstance(sys.exc_info()[1], OSError):
+            super().handleError(record)
+
+
 @contextmanager
 def log_of(out: Path) -> Iterator[logging.Logger]:
     """Yield a logger that appends to `log.txt` of a run directory, and close it at the end."""
     log = logging.getLogger(f"smarticles.{out.resolve()}")
     log.setLevel(logging.INFO)
     log.propagate = False
-    handler = logging.FileHandler(out / LOG, encoding="utf-8")
+    handler = _LogFile(out / LOG, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     log.addHandler(handler)
     try:
         yield log
     finally:
         log.removeHandler(handler)
-        handler.close()
+        with suppress(OSError):  # lines that the disk could not hold
+            handler.close()

@@ -175,8 +175,13 @@ class Simulation:
         self._stage = self.scene.phases[self._phase].begin(self.scene, self._phase)
         self._stage.memory = dict(state["stage"])
         self._performed = [dict(entry) for entry in state["performed"]]
-        self._spent, self._began = state["wall_s"], time.monotonic()
-        self._cpu_spent, self._cpu_began = state["cpu_s"], time.process_time()
+        if len(self._performed) != self._phase + 1:
+            raise ValueError(f"{len(self._performed)} phases performed in phase {self._phase}")
+        for entry in self._performed:  # a wrong type would fail only when the phase ends; times begin below 0
+            times = {name: abs(entry[name]) for name in ("start_s", "wall_s", "cpu_s")}
+            Phase(**{**entry, **times})
+        self._spent, self._began = float(state["wall_s"]), time.monotonic()
+        self._cpu_spent, self._cpu_began = float(state["cpu_s"]), time.process_time()
 
     @property
     def wall(self) -> float:

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import BeforeValidator, Field, model_validator
 
 from dem.body.linkage import Joint, Three
+from dem.errors import shown
 from dem.setting.part import Part, Turning, as_list
 
 BENT = 150.0  # deg, largest angle at rest or of a motor: beyond it, links would lie on each other
@@ -23,7 +24,7 @@ def _axes(value: Any) -> Any:
     if isinstance(value, int) and not isinstance(value, bool) and 1 <= value <= len(_USUAL):
         return _USUAL[:value]
     if not isinstance(value, list | tuple) or not all(isinstance(each, list | tuple) for each in value):
-        raise ValueError(f"got {value!r}; give 1, 2 or 3, or a list of one or two directions such as [[0, 0, 1]]")
+        raise ValueError(f"got {shown(value)}; give 1, 2 or 3, or a list of one or two directions such as [[0, 0, 1]]")
     if tuple(map(tuple, value)) != _USUAL and not 1 <= len(value) <= 2:
         raise ValueError(
             f"{len(value)} directions; give one (a hinge) or two (the second fixed in the link after), or the number "

@@ -12,7 +12,7 @@ from dem.arrays import Array
 from dem.body.bars import Bars
 from dem.body.filament import Filament, Liquid, PreferredCurvature
 from dem.body.linkage import Linkage, layout_of, link_of
-from dem.errors import InputError
+from dem.errors import InputError, nearest, shown
 from dem.setting.joints import AnyJoint
 from dem.setting.part import LONGEST_LENGTH, Density, Length, Part, Stiffness, as_list
 
@@ -289,7 +289,7 @@ class Free(Shaped):
         for k, pair in enumerate(pairs):
             for end in pair:
                 if not (isinstance(end, int) and 0 <= end < len(points)):
-                    raise ValueError(f"pairs.{k}: there is no point {end!r}; use 0 to {len(points) - 1}")
+                    raise ValueError(f"pairs.{k}: there is no point {shown(end)}; use 0 to {len(points) - 1}")
             if points[pair[0]] == points[pair[1]]:
                 raise ValueError(f"pairs.{k}: joins a point with itself, a bar 0 m long; join two different points")
         reached = {pairs[0][0]} if pairs else set()
@@ -414,8 +414,10 @@ def listed(value: Any) -> Any:
     if value is None or value == "smarticle":
         return None
     if isinstance(value, str):
-        names = ", ".join(shape.tag() for shape in SHAPES)
-        raise ValueError(f"{value!r} needs its lengths: write {{shape: {value}, …}}; shapes are {names}, or smarticle")
+        names = [*(shape.tag() for shape in SHAPES), "smarticle"]
+        if value not in names:
+            raise ValueError(f"{shown(value)} is no shape; {nearest(value, names)}")
+        raise ValueError(f"{value!r} needs its lengths: write {{shape: {value}, …}}; shapes are {', '.join(names)}")
     return [value] if not isinstance(value, list | tuple) else value
 
 

@@ -78,18 +78,23 @@ def print_keys(arguments: argparse.Namespace) -> int:
     from dem.scene.reading import json_schema  # noqa: PLC0415
 
     schema = json_schema()
-    parts = dict(_parts(schema))
+    parts = list(_parts(schema))
+    known = list(dict.fromkeys(name for name, _ in parts))
     if arguments.name is None:
         print(
             *_described(schema),
             "",
-            *wrap(f"more, by `smarticles keys NAME`: {', '.join(parts)}", 100, break_on_hyphens=False),
+            *wrap(f"more, by `smarticles keys NAME`: {', '.join(known)}", 100, break_on_hyphens=False),
             sep="\n",
         )
         return 0
-    if arguments.name not in parts:
-        raise InputError(f"keys {arguments.name}: is no part of a scene; {nearest(arguments.name, parts)}")
-    print(*_described(parts[arguments.name]), sep="\n")
+    if arguments.name not in known:
+        raise InputError(f"keys {arguments.name}: is no part of a scene; {nearest(arguments.name, known)}")
+    # Several parts may have one name: `motor` is a key of scenes, and a law of joints.
+    found = [definition for name, definition in parts if name == arguments.name]
+    for number, definition in enumerate(found):
+        if definition not in found[:number]:
+            print(*([""] if number else []), *_described(definition), sep="\n")
     return 0
 
 

@@ -8,6 +8,7 @@ import gc
 import json
 import math
 import os
+import resource
 import signal
 import time
 from collections.abc import Iterator
@@ -25,15 +26,14 @@ from scenes import CHAIN, SMALL, changed, small
 
 from dem.errors import InputError
 from dem.plan.outlook import plan
-from dem.scene.reading import dump_scene, json_schema
+from dem.scene.reading import json_schema
 from smarticles.commands.run import read_scene
-from studies.registry import STUDIES
-from templates.sweep.expand import expand
-from templates.sweep.sweep_file import load_sweep
+from validation.fuzz import places, scaled, shipped_scenes, value_at
 
 # As many as 20 s are enough for on a busy machine; 0.01 s each, and what hypothesis itself takes.
 TRIED = int(os.environ.get("ANY_SCENES", "200"))
 MOST_S = 1.0  # of processor time
+MOST_BYTES = 2**30
 MOST_CHARACTERS = 1500  # of a line; three errors with long lists of choices have 1000
 ENOUGH = settings(
     max_examples=TRIED,
@@ -42,21 +42,16 @@ ENOUGH = settings(
     database=None,
 )
 
-Place = tuple[str | int, ...]
-
 
 def shipped() -> list[dict[str, Any]]:
-    """Scenes of all shipped sweeps, every default written out, and small ones that leave most of them out."""
-    sweeps = [study.sweep_file(quick=True) for study in STUDIES.values() if getattr(study, "quick", True)]
-    assert len(sweeps) > 5
-    points = [point for sweep in sweeps for point in expand(load_sweep(sweep))[::9]]
+    """Scenes of sweeps, starters and pages, and small ones that leave most keys out."""
     sine = {"type": "sine", "centre_deg": 90, "amplitude_deg": 5, "frequency_hz": 3}
     ramp = {"type": "ramp", "to_deg": 0, "duration_s": 0.5}
     swings = {"type": "sequence", "steps": [ramp, {"type": "return", "duration_s": 0.5}], "repeat": 3}
     both = {"type": "actuate", "barb_1": sine, "barb_2": swings, "duration_s": 2}
     tiers = [{"radius_m": 0.0234, "height_m": 0.05}, {"radius_m": 0.02, "height_m": 0.1}]
     return [
-        *(yaml.safe_load(dump_scene(point.scene)) for point in points),
+        *shipped_scenes(),
         *(SMALL, CHAIN),
         changed(SMALL, {"phases.1": both, "phases.2": {"type": "internal-oscillation", "theta_deg": 10}}),
         changed(SMALL, {"hooks": {}, "phases.2": {"type": "pull-hook"}}),
@@ -91,32 +86,10 @@ ANYTHING = st.recursive(
 KEYS = sorted({key for part in [SCHEMA, *SCHEMA["$defs"].values()] for key in part.get("properties", {})})
 
 
-def places(data: Any, here: Place = ()) -> Iterator[Place]:
-    """The places of all values below."""
-    for key, value in data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ():
-        yield (*here, key)
-        yield from places(value, (*here, key))
-
-
-def value_at(data: Any, place: Place) -> Any:
-    for step in place:
-        data = data[step]
-    return data
-
-
-def scaled(value: float, factor: float) -> float:
-    """The value times a factor, of its own type where that holds it; as it is where no number does."""
-    try:
-        product = value * factor
-    except OverflowError:  # whole numbers of Python have any length
-        return value
-    return type(value)(product) if math.isfinite(product) else product
-
-
 @st.composite
 def broken(draw: st.DrawFn) -> Any:
     """A shipped scene with one to three things done to it."""
-    data = deepcopy(draw(st.sampled_from(SHIPPED)))
+    data = deepcopy(draw(st.sampled_from(SHIPPED) | st.sampled_from(SHAPED)))
     for _ in range(draw(st.integers(1, 3))):
         found = list(places(data))
         if not found:
@@ -147,21 +120,26 @@ def broken(draw: st.DrawFn) -> Any:
 
 
 SHIPPED = shipped()
+SHAPED = [scene for scene in SHIPPED if scene.get("particle")]
 
 
 @contextmanager
 def at_most(seconds: float) -> Iterator[None]:
-    """Stops what takes more processor time: a search that never ends must not hold up the tests."""
+    """Stops what takes more processor time or memory: a search that never ends must not hold up the tests."""
 
     def late(*_: object) -> None:
         msg = f"still at it after {seconds:g} s of processor time"
         raise TimeoutError(msg)
 
     before = signal.signal(signal.SIGVTALRM, late)
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + MOST_BYTES, limits[1]))
     signal.setitimer(signal.ITIMER_VIRTUAL, seconds)
     try:
         yield
     finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
         signal.setitimer(signal.ITIMER_VIRTUAL, 0)
         signal.signal(signal.SIGVTALRM, before)
 

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -42,10 +43,10 @@ def assert_same_ends(found, wanted, tolerance):
     [np.vstack([np.eye(3), -np.eye(3)]), np.random.default_rng(0).normal(size=(200, 3))],
     ids=["axes", "random"],
 )
-def test_orientations_turn_x_along_the_capsule(directions):
+def test_orientations_turn_z_along_the_capsule(directions):
     quaternions = orientations(directions)
     assert np.linalg.norm(quaternions, axis=1) == pytest.approx(1.0)
-    turned = Rotation.from_quat(quaternions, scalar_first=True).apply([1.0, 0.0, 0.0])
+    turned = Rotation.from_quat(quaternions, scalar_first=True).apply([0.0, 0.0, 1.0])
     unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
     assert np.abs((turned * unit).sum(axis=1)) == pytest.approx(1.0, abs=1e-12)
 
@@ -66,6 +67,8 @@ def test_capsules_are_the_strands_that_contacts_see(pile, rows):
     found = placed(capsules.ends.mean(axis=1), quaternions, shapes, capsules.type_of)
     assert_same_ends(found, wanted, 1e-12)
     assert [shape["rounding_radius"] for shape in shapes] == [run.manifest.sphere_diameter_m / 2] * 3
+    # OVITO 3.17 opens no file with other polyhedra than capsules along z.
+    assert all(np.array(shape["vertices"])[:, :2].tolist() == [[0.0, 0.0]] * 2 for shape in shapes)
     json.dumps(shapes)
     # The outermost surfaces of the rows are the faces of the flat bar.
     apart = np.linalg.norm(axes[:, 0, 1] - axes[:, -1, 1], axis=1)
@@ -98,6 +101,16 @@ def test_a_trajectory_is_read_back(pile, tmp_path):
             assert found.particles.body.tolist() == frame.smarticle_ids[capsules.body].tolist()
             contacts = found.log["particles/contacts"]
             assert contacts.tolist() == frame.contacts[capsules.body].tolist()
+
+
+def test_links_without_length_are_spheres(tmp_path):
+    run = Run(write_run(tmp_path / "straight", SyntheticRun(frames_per_phase=2)))
+    capsules = capsules_of(run.frames[-1], run)
+    barbs = capsules.type_of != 1
+    ends = np.where(barbs[:, None, None], capsules.ends[:, :1], capsules.ends)
+    shapes = shapes_of(replace(capsules, ends=ends))
+    assert [shape["type"] for shape in shapes] == ["Sphere", "ConvexPolyhedron", "Sphere"]
+    assert shapes[0]["diameter"] == 2 * capsules.radii[0]
 
 
 @pytest.mark.skipif(HAS_GSD, reason="the package gsd is installed")

@@ -99,6 +99,25 @@ except RunError as error:
 """
 
 
+LONG_LOG = """
+import sys
+from pathlib import Path
+from dem.record.rundir import log_of
+
+with log_of(Path(sys.argv[1])) as log:
+    for _ in range(1000):
+        log.info("%s", "x" * 100)
+print("ended")
+"""
+
+
+def test_a_log_on_a_full_disk_prints_nothing(mount_disk: Callable[[str], Path]) -> None:
+    disk = mount_disk("16k")
+    command = [sys.executable, "-c", LONG_LOG, str(disk)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "ended\n", "")
+
+
 def test_series_on_a_really_full_disk(mount_disk: Callable[[str], Path]) -> None:
     disk = mount_disk("64k")
     # In a process of its own: where HDF5 cannot flush a file, it takes the process with it.

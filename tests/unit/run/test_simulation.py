@@ -323,7 +323,14 @@ def test_a_run_whose_frames_are_damaged_is_not_continued_and_not_changed(
 
 @pytest.mark.parametrize("recording", [{}, ONE_FILE])
 @pytest.mark.parametrize(
-    "forge", [lambda state: state.pop("recorder"), lambda state: state["recorder"].update(frames=1)]
+    "forge",
+    [
+        lambda state: state.pop("recorder"),
+        lambda state: state["recorder"].update(frames=1),
+        lambda state: state["performed"][-1].update(cpu_s="x"),
+        lambda state: state["performed"].clear(),
+        lambda state: state.update(wall_s=[]),
+    ],
 )
 def test_a_forged_checkpoint_is_rejected_in_one_line(
     kind: KindDouble,

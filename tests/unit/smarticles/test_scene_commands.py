@@ -111,6 +111,10 @@ def test_keys_are_printed_with_range_and_meaning(smarticles: Smarticles) -> None
     assert {"motor", "shake", "container", "recording", "fidelity", "phases", "barbs"} <= set(names)
     assert "one of: actuate, arrange, compress, deposit" in smarticles("keys", "phases").out.replace("\n", " ")
     assert all(smarticles("keys", name).status == 0 for name in names)
+    motor = smarticles("keys", "motor").out  # a key of scenes, and a law of joints
+    assert motor.startswith("The motor of each hinge")
+    assert "  law: motor\n" in motor.partition("\n\n")[2]
+    assert smarticles("keys", "settle").out.count("timeout_s") == 1
     wrong = smarticles("keys", "moter")
     assert (wrong.status, wrong.err) == (
         2,

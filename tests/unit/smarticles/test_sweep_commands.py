@@ -8,9 +8,12 @@ import pytest
 from command_cases import Smarticles, WriteRun
 from synthetic import write_ended
 
+from dem.errors import RunError
 from dem.plan.steps import time_steps
 from dem.scene.scene import Scene
+from smarticles.sweeps import raise_failures
 from studies.registry import shipped
+from templates.local import Outcome
 from templates.sweep.folder import open_folder
 
 
@@ -108,6 +111,18 @@ def test_a_failing_run_is_status_1_with_its_cause(sweep_file: Path, tmp_path: Pa
     assert lines[3].endswith(f"start them again: smarticles resume {out}")
     assert (out / "runs" / "n5.stopped-1" / "run.json").exists()
     assert (out / "logs" / "n5.txt").read_text(encoding="utf-8").startswith("smarticles: error: ")
+
+
+def test_of_many_failed_runs_the_first_are_named(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
+    out = tmp_path / "out"
+    smarticles("sweep", sweep_file, "--out", out)
+    outcomes = [Outcome(name=f"n{k}", status="failed" if k % 2 else "done", cause=f"cause {k}") for k in range(40)]
+    with pytest.raises(RunError) as raised:
+        raise_failures(open_folder(out), outcomes)
+    message = str(raised.value)
+    assert "20 of 40 runs are missing: n1: cause 1; n3: cause 3" in message
+    assert f"n9: cause 9; 15 more, see smarticles status {out}; logs are in" in message
+    assert "n11" not in message
 
 
 @pytest.mark.parametrize(
