@@ -74,8 +74,9 @@ from dem.setting.hooks import Bar
 Array = NDArray[np.float64]
 
 # Thinnest and thickest skins of both lists, and the width of a strip of the search, in diameters of the thickest
-# segment. Measured on a shaken pile of 270, see `benchmarks/`.
+# segment; `STRANDS` are skins where links have several strands. Measured on a shaken pile of 270, see `benchmarks/`.
 NEAR_SKINS, WIDE_SKINS, STRIP = (0.04, 0.15), (0.05, 2.0), 4.0
+STRANDS = (0.06, 0.225), (0.225, 3.0)
 NEAR_STEPS, WIDE_STEPS = 6, 40  # steps that a skin of the tight and of the wide list should last
 FAR = 1e30  # m; recorded coordinate of segments that did not exist when the list was built
 LISTS = ("first", "second", "slip", "used", "near")  # fields of `Pairs` that are kept
@@ -156,7 +157,9 @@ class World:
         self.ledger: Array | None = np.zeros((256, LEDGER)) if self.keep_ledger else None
         self.meeting, self.plane = np.zeros((meeting.ROWS, meeting.COLUMNS)), np.zeros(PLANE)
         diameter = 2 * float(self.shapes.lines[:, RADIUS].max())
-        self.skins = diameter * np.array([*NEAR_SKINS, 0.0, *WIDE_SKINS, 0.0, STRIP])
+        several = any(len(np.unique(kind.link)) < len(kind.link) for kind in self.kinds)
+        near, wide = STRANDS if several else (NEAR_SKINS, WIDE_SKINS)
+        self.skins = diameter * np.array([*near, 0.0, *wide, 0.0, STRIP])
 
     @property
     def count(self) -> int:
