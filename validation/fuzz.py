@@ -28,6 +28,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, chdir, contextmanager, redirect_stderr, redirect_stdout
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -113,9 +114,9 @@ class Scenes:
         schema = json_schema()
         self.keys = sorted({key for part in [schema, *schema["$defs"].values()] for key in part.get("properties", {})})
         self.shipped = shipped_scenes()
-        kinds = {json.dumps(self._shapes(scene)): [] for scene in self.shipped}  # type: dict[str, list[dict[str, Any]]]
+        kinds: dict[str, list[dict[str, Any]]] = {}
         for scene in self.shipped:
-            kinds[json.dumps(self._shapes(scene))].append(scene)
+            kinds.setdefault(json.dumps(self._shapes(scene)), []).append(scene)
         self.kinds = list(kinds.values())
         self.texts = [str(yaml.safe_dump(scene, allow_unicode=True, sort_keys=False)) for scene in self.shipped]
 
@@ -173,9 +174,9 @@ class Scenes:
 
     def cut(self, rng: random.Random) -> str:
         """Return the text of a scene with something cut out, and something put in."""
-        text, at = rng.choice(self.texts), rng.randrange(3000)
+        text, at, length = rng.choice(self.texts), rng.randrange(3000), rng.choice([0, 1, 9, 200])
         inserted = rng.choice([*TEXTS, f"{rng.choice(NUMBERS[:16])}", rng.choice(self.keys), "\t", "#", ": ", "\n  "])
-        return text[:at] + inserted.encode("utf-8", "replace").decode() + text[at + rng.choice([0, 1, 9, 200]) :]
+        return f"{text[:at]}{inserted.encode('utf-8', 'replace').decode()}{text[at + length :]}"
 
 
 def check_scene(scene: Any, folder: Path) -> str:
@@ -436,8 +437,8 @@ def fuzz_scenes(count: int, seed: int, out: Path) -> Tally:
         check_scene(scene, out)
     for number in range(count):
         rng = random.Random(f"scene {seed} {number}")
-        scene = scenes.cut(rng) if number % 10 == 0 else scenes.draw(rng)
-        tally.call(lambda scene=scene: check_scene(scene, out), scene if isinstance(scene, str) else repr(scene))  # type: ignore[misc]
+        drawn: Any = scenes.cut(rng) if number % 10 == 0 else scenes.draw(rng)
+        tally.call(partial(check_scene, drawn, out), drawn if isinstance(drawn, str) else repr(drawn))
     return tally
 
 
@@ -460,7 +461,7 @@ def fuzz_lines(count: int, seed: int, out: Path, runs: Sequence[Path]) -> Tally:
             f"{number} {words!r}", encoding="utf-8", errors="replace"
         )  # names what ends this process
         with chdir(folder), nothing_started():
-            tally.call(lambda words=words: check_line(words), repr(words))  # type: ignore[misc]
+            tally.call(partial(check_line, words), repr(words))
     return tally
 
 

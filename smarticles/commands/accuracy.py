@@ -76,6 +76,9 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
 
     seeds = None if arguments.seeds is None else accuracy.parse_seeds(arguments.seeds)
     knobs = None if arguments.knobs is None else accuracy.parse_knobs(arguments.knobs)
+    # Before the ladder, which can take seconds.
+    if not arguments.dry_run and arguments.out is None:
+        raise InputError("accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder")
     scene = load_scene(arguments.scene, scene_settings(arguments))
     ladder = accuracy.build_ladder(scene, source=str(arguments.scene), knobs=knobs)
     expected_s = {setting: expected_wall_s(variant) for setting, variant in ladder.scenes.items()}
@@ -84,8 +87,6 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
     seeds = seeds or accuracy.default_seeds(scene)
     sweep = accuracy.ladder_sweep(scene, ladder, seeds)
     points = expand(sweep)
-    if not arguments.dry_run and arguments.out is None:
-        raise InputError("accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder")
     print(_listing(ladder, expected_s, len(seeds), arguments.jobs), flush=True)
     if len(seeds) < 2:
         warn("the scatter is unknown with one seed, so that no error can be resolved; give --seeds 1,2,3")

@@ -153,6 +153,14 @@ def test_bad_input_is_one_line_and_status_2(words: str, message: str, base: Path
     assert message in line
 
 
+def test_without_a_directory_no_ladder_is_built(
+    base: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("studies.accuracy.build_ladder", None)
+    said = smarticles("accuracy", base)
+    assert "--out DIR is missing" in said.err
+
+
 def test_without_a_table_the_planner_says_how_to_make_one(
     base: Path, tmp_path: Path, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
