@@ -101,7 +101,7 @@ def value_at(data: Any, place: Sequence[Any]) -> Any:
 def scaled(value: float, factor: float) -> float:
     """Return a number times a factor, of the number's type where it can hold the product."""
     try:
-        product = value * factor
+        product = value * float(factor)
     except OverflowError:  # whole numbers of Python have any length
         return value
     return type(value)(product) if math.isfinite(product) else product
