@@ -11,7 +11,7 @@ from typing import Any
 from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.plan.steps import stable_step
-from dem.record.names import FAILED
+from dem.record.names import FAILED, LOG
 from dem.run.recorder import Recorder
 from dem.scene.scene import Scene
 from validation.access import EngineAccess
@@ -134,7 +134,10 @@ def soft(access: EngineAccess, out: Path, *, stiffness: float) -> list[Check]:
 # A long case: welded smarticles chatter and never settle, so that the pour waits until its time limit.
 @hard("spoilt: time step 4 of the stable one", None, {"factor": 4.0, "count": 6, "seconds": 0.3})
 def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, seconds: float) -> list[Check]:
-    """Run for some `seconds` at `factor` times the stable time step; the error must name a checkpoint."""
+    """Run for some `seconds` at `factor` times the stable time step, which the run must report.
+
+    The error must name a checkpoint. A few welded smarticles chatter on the spot: there the log must warn of it.
+    """
     fidelity = "draft" if access.name == "yade" else {"base": "draft", "control_interval_s": LONG_CONTROL}
     recording = {"checkpoint_interval_s": 0.02}
     data = scene_data(access, swing(seconds), count=count, fidelity=fidelity, recording=recording)
@@ -144,7 +147,9 @@ def wrong_step(access: EngineAccess, out: Path, *, factor: float, count: int, se
         return [control / max(1, math.floor(control / (factor * stable_step(scene))))] * len(scene.phases)
 
     run = whole(data, out, steps=steps)
-    kind = run.error[0] if run.error else "none"
+    if run.error is None:
+        return [says((out / LOG).read_text(), "contact forces still fluctuate", "counts as settled")]
+    kind = run.error[0]
     return [Check("kind of error", kind, "RunError", kind == "RunError"), says(run.text, "(last good checkpoint: ")]
 
 
