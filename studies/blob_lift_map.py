@@ -16,7 +16,7 @@ from postprocess.statistics.seeds import mean_over_seeds
 from studies.blob_lift import ACTIVE, LEFT, OTHERS, QUANTITIES, RISE, SHARE, WHOLE
 from studies.blob_lift import measure as measure_lift
 from studies.framework.figures import Rows, Series, marker
-from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, unit_of
+from studies.framework.findings import Effect, Finding, Outcome, Verdict, all_of, symbol, unit_of
 from studies.framework.runs import Key, Row
 from studies.framework.study import Study
 
@@ -71,7 +71,7 @@ def quiet_above_active(column: str) -> Callable[[pd.DataFrame], Outcome]:
     def effect(runs: pd.DataFrame) -> Effect:
         ends = runs[ACTIVE].max(), runs[ACTIVE].min()
         value = mean_over_seeds(paired_differences(runs, column, ACTIVE, ends, [SEED])[column])
-        label = f"{QUANTITIES[column].label} of the quiet blob less that of the active one"
+        label = f"{symbol(column)} of the quiet blob less that of the active one"
         return Effect(label=label, value=value, unit=unit_of(column))
 
     return lambda table: at_each_point(table, effect)
