@@ -7,8 +7,10 @@ a study. `provenance.json` in each folder has the runs one by one.
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import yaml
 
@@ -36,12 +38,12 @@ def write_package(repository: Path, output: Path) -> None:
     (output / "results" / SUMS).write_text(checksums(results), encoding="utf-8")
     citation = yaml.safe_load((repository / "CITATION.cff").read_text(encoding="utf-8"))
     folders = [path.parent for path in sorted(results.rglob(_PROVENANCE))]
-    actions = [_action(repository, folder) for folder in folders]
-    files = {one["@id"] for action in actions for key in ("instrument", "object") for one in _listed(action[key])}
+    made = {folder: json.loads((folder / _PROVENANCE).read_text(encoding="utf-8")) for folder in folders}
+    inputs = {folder: [*_inputs(repository, folder, made[folder]["study"])] for folder in folders}
     parts = [
         *(part(repository, folder) for folder in folders),
         *(part(repository, results / name) for name in ("claims.yaml", SUMS)),
-        *(_source(repository, name, citation["version"]) for name in sorted(files)),
+        *(_source(repository, name, citation["version"]) for name in sorted({*chain(*inputs.values())})),
     ]
     root = {
         "name": citation["title"],
@@ -55,13 +57,9 @@ def write_package(repository: Path, output: Path) -> None:
     others: list[Entity] = [
         {"@id": _LICENCE, "@type": "CreativeWork", "name": "MIT licence", "description": "File LICENSE"},
         {"@id": _AUTHORS, "@type": "Organization", "name": citation["authors"][0]["name"]},
-        *actions,
+        *(_action(repository, folder, made[folder], inputs[folder]) for folder in folders),
     ]
     write_crate(output / NAME, root, parts, others)
-
-
-def _listed(references: dict[str, str] | list[dict[str, str]]) -> list[dict[str, str]]:
-    return references if isinstance(references, list) else [references]
 
 
 def _source(repository: Path, name: str, version: str) -> Entity:
@@ -72,18 +70,16 @@ def _source(repository: Path, name: str, version: str) -> Entity:
     return {**found, "@type": kind, "programmingLanguage": "Python", "version": version}
 
 
-def _action(repository: Path, folder: Path) -> Entity:
-    """Make the action that a folder of results came from, by its `provenance.json`."""
-    made = json.loads((folder / _PROVENANCE).read_text(encoding="utf-8"))
-    name, runs = folder.relative_to(repository).as_posix(), made["runs"]
-    script, *inputs = _inputs(repository, folder, made["study"])
+def _action(repository: Path, folder: Path, made: Mapping[str, Any], inputs: Sequence[str]) -> Entity:
+    """Make the action that a folder of results came from; `made` is its provenance, its script the first input."""
+    name, runs, (script, *others) = folder.relative_to(repository).as_posix(), made["runs"], inputs
     return {
         "@id": f"#{name}",
         "@type": "CreateAction",
         "name": f"{name}: {len(runs)} runs of study {made['study']}",
         "description": f"{made['command']}. {made['footer'][-1]}",
         "instrument": refer(script),
-        "object": refer(*inputs),
+        "object": refer(*others),
         "result": refer(f"{name}/"),
         "startTime": min(run["started"] for run in runs),
         "agent": refer(_AUTHORS),

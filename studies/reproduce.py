@@ -71,11 +71,9 @@ class Chosen:
         path = RESULTS / self.table / self.ladder
         return accuracy.build_ladder(load_scene(path), source=str(path))
 
-    def points(self) -> dict[str, Point]:
-        """Return the points of the table's sweep by the name of the run."""
-        return {point.name: point for point in expand(self._sweep())}
-
-    def _sweep(self) -> Sweep:
+    @property
+    def sweep(self) -> Sweep:
+        """The sweep of the table's scenes."""
         if self.ladder:
             scene = load_scene(RESULTS / self.table / self.ladder)
             return accuracy.ladder_sweep(scene, self._ladder, _LADDER_SEEDS)
@@ -146,7 +144,7 @@ def _listed(path: Path) -> dict[str, Any]:
 @cache
 def points_of(one: Chosen) -> dict[str, Point]:
     """Return the points of a table's sweep by the name of the run."""
-    return one.points()
+    return {point.name: point for point in expand(one.sweep)}
 
 
 @cache

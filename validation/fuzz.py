@@ -147,10 +147,8 @@ class Scenes:
                 return data
             *above, last = rng.choice(found)
             parent = value_at(data, above)
-            value, what = (
-                parent[last],
-                rng.choice(["put", "scale", "near", "near", "drop", "add", "nest", "twice", "of"]),
-            )
+            value = parent[last]
+            what = rng.choice(["put", "scale", "near", "near", "drop", "add", "nest", "twice", "of"])
             number = isinstance(value, int | float) and not isinstance(value, bool)
             if what == "drop":
                 del parent[last]
@@ -193,7 +191,7 @@ def check_scene(scene: Any, folder: Path) -> str:
     except InputError as error:
         line = str(error)
         assert len(line.splitlines()) == 1, f"lines: {line}"
-        assert isinstance(scene, str) is False or line.startswith(source), f"no file named: {line}"
+        assert not isinstance(scene, str) or line.startswith(source), f"no file named: {line}"
         assert len(line) <= MOST_CHARACTERS, f"too long: {line}"
         return "rejected"
     words = planned.to_text().replace(",", " ").split()
@@ -247,35 +245,11 @@ class Lines:
         self.paths = [*FILES, "empty", "sweep", "absent", "new", "sweep/runs/n5_1", *(run.name for run in runs)] + [
             f"{run.name}/{name}" for run in runs for name in ("series.h5", "run.json", "frames", "scene.yaml")
         ]
-        self.outputs = [
-            "new.png",
-            "new.gif",
-            "new.csv",
-            "new.html",
-            "new.glb",
-            "new.gsd",
-            "new.vtp",
-            "new",
-            "a/b/c.png",
-        ]
+        self.outputs = [*(f"new.{suffix}" for suffix in "png gif csv html glb gsd vtp".split()), "new", "a/b/c.png"]
         self.words = [
             *(text for text in TEXTS if "\x00" not in text and "\ud800" not in text),
-            *(
-                "1",
-                "0",
-                "-1",
-                "0.5",
-                "nan",
-                "inf",
-                "1e400",
-                "9" * 5000,
-                "1,2",
-                "1:2",
-                "run",
-                "count=3",
-                "phases.1=",
-                "=",
-            ),
+            *("1 0 -1 0.5 nan inf 1e400 1,2 1:2 run count=3 phases.1= =".split()),
+            "9" * 5000,
             *("fidelity=draft", "particle={shape: rod, length_m: 0.01}", "phases.0.type=lift", "speed", "top", "01:00"),
             *("phases.9.x=1", "x.y.z=[", "seed=1e9", "linking", "crossing-number", "theta", "count", "last", "gravish"),
             *("--", "-", "-x", "--help", "--debug", "--=", "@x", "~", "*"),
@@ -349,12 +323,8 @@ def nothing_started() -> Iterator[None]:
         raise KeyboardInterrupt
 
     with ExitStack() as stack:
-        for target in (
-            "dem.run.run.run_scene",
-            "templates.local.run_folder",
-            "postprocess.view.view_run",
-            "time.sleep",
-        ):
+        starters = "dem.run.run.run_scene templates.local.run_folder postprocess.view.view_run time.sleep"
+        for target in starters.split():
             stack.enter_context(mock.patch(target, stopped))
         stack.enter_context(mock.patch.object(subprocess, "Popen", Absent))
         yield
@@ -457,9 +427,8 @@ def fuzz_lines(count: int, seed: int, out: Path, runs: Sequence[Path]) -> Tally:
             write_files(folder, runs)
         rng = random.Random(f"line {seed} {number}")
         words = lines.draw(rng)
-        (out / "last.txt").write_text(
-            f"{number} {words!r}", encoding="utf-8", errors="replace"
-        )  # names what ends this process
+        # Names what ends this process.
+        (out / "last.txt").write_text(f"{number} {words!r}", encoding="utf-8", errors="replace")
         with chdir(folder), nothing_started():
             tally.call(partial(check_line, words), repr(words))
     return tally
@@ -476,14 +445,12 @@ def fuzz(arguments: Sequence[str] | None = None) -> int:
     given = parser.parse_args(arguments)
     warnings.simplefilter("error")
     failed = 0
-    runs = [run.resolve() for run in given.runs]
-    for what, count in (("scenes", given.scenes), ("lines", given.lines)):
+    check_lines = partial(fuzz_lines, runs=[run.resolve() for run in given.runs])
+    for what, count, check in (("scenes", given.scenes, fuzz_scenes), ("lines", given.lines, check_lines)):
         if count:
             out = given.out.resolve() / what
             out.mkdir(parents=True, exist_ok=True)
-            tally = (
-                fuzz_scenes(count, given.seed, out) if what == "scenes" else fuzz_lines(count, given.seed, out, runs)
-            )
+            tally = check(count, given.seed, out)
             print(f"{count} {what}: {tally}", *(f"{n} × {key}" for key, n in tally.failures.most_common()), sep="\n")
             failed += tally.failures.total()
     return int(failed > 0)

@@ -10,9 +10,8 @@ import filament_cases
 import numpy as np
 import pytest
 import yaml
+from beams import elastica
 from filament_cases import DENSITY, WORM, D, E, L
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 from stopping import assert_equal_frames
 from test_bodies import run
 
@@ -26,20 +25,6 @@ SLOWEST = 3.5160 * math.sqrt(B / MU / L**4)  # first bending frequency of a cant
 def gravity(load: float) -> float:
     """Gravity at which the weight per length is `load` B/L³ [m/s²]."""
     return load * B / L**3 / MU
-
-
-def elastica(load: float) -> tuple[float, float]:
-    """Place of the free end of a cantilever in L, by B θ'' = w (L - s) cos θ, θ(0) = 0, θ'(L) = 0."""
-
-    def shoot(bend: float) -> np.ndarray:
-        found = solve_ivp(
-            lambda s, y: [y[1], load * (1 - s) * math.cos(y[0]), math.cos(y[0]), math.sin(y[0])],
-            (0, 1), [0, bend, 0, 0], rtol=1e-10, atol=1e-12,
-        )  # fmt: skip
-        return np.asarray(found.y[:, -1])
-
-    _, _, x, z = shoot(-brentq(lambda b: shoot(-b)[1], 0.0, load))
-    return float(x), float(z)
 
 
 def test_a_cantilever_bends_far_as_beam_theory_says(simulate: Simulate) -> None:
