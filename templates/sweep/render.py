@@ -4,6 +4,7 @@ For YAML, each `{{ … }}` becomes a placeholder in the text. The text is parsed
 then replaced by the values. A value that is alone keeps its type, and no value can change the structure of the YAML.
 """
 
+import gc
 import os
 import re
 import resource
@@ -42,11 +43,15 @@ class _TooLongError(BaseException):
 def _limited() -> Iterator[None]:
     """Raise MemoryError or `_TooLongError` if a rendering exceeds `MOST_MEMORY` or `MOST_SECONDS`.
 
-    Without `/proc` the memory is not limited, and in threads other than the main one the time is not.
+    Without `/proc` the memory is not limited, and in threads other than the main one the time is not. Garbage is
+    collected afterwards: in a process with many objects that takes as long as a rendering may, and Python passes over
+    what is raised meanwhile. For the same reason the signal comes again every 0.1 s.
     """
+    collected = gc.isenabled()
     timed = threading.current_thread() is threading.main_thread()
     before = resource.getrlimit(resource.RLIMIT_AS)
     statm = Path("/proc/self/statm")
+    gc.disable()
     try:
         if statm.exists():
             most = int(statm.read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE") + MOST_MEMORY
@@ -54,13 +59,15 @@ def _limited() -> Iterator[None]:
             resource.setrlimit(resource.RLIMIT_AS, (soft, before[1]))
         if timed:
             handler = signal.signal(signal.SIGVTALRM, _stop)
-            signal.setitimer(signal.ITIMER_VIRTUAL, MOST_SECONDS)
+            signal.setitimer(signal.ITIMER_VIRTUAL, MOST_SECONDS, 0.1)
         yield
     finally:
         if timed:
             signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
             signal.signal(signal.SIGVTALRM, handler)
         resource.setrlimit(resource.RLIMIT_AS, before)
+        if collected:
+            gc.enable()
 
 
 def _stop(_number: int, _frame: FrameType | None) -> None:

@@ -1,5 +1,7 @@
 """Templates: values keep their type, cannot break out, and a misspelt name is an error."""
 
+import gc
+import os
 import resource
 import signal
 from typing import Any
@@ -9,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dem.errors import InputError
-from templates.sweep.render import evaluate, render_yaml
+from templates.sweep.render import MOST_SECONDS, _limited, _TooLongError, evaluate, render_yaml
 
 
 @pytest.mark.parametrize("text", ['a: b\ninjected: "yes"', "'; } ] --- # {{ 7 * 7 }}", "null", "", "value0z"])
@@ -127,3 +129,40 @@ def test_a_template_that_would_take_all_memory_or_hours_is_rejected(template: st
     with pytest.raises(InputError, match=message):
         render_yaml(template, {"x": 1}, "t")
     assert (resource.getrlimit(resource.RLIMIT_AS), signal.getitimer(signal.ITIMER_VIRTUAL)) == limits
+
+
+class _Slow:
+    """Takes longer than a rendering may, while it is deleted: Python passes over what is raised there."""
+
+    def __del__(self) -> None:
+        spin(MOST_SECONDS + 0.5)
+
+
+def spin(seconds: float) -> None:
+    """Compute for some seconds of the process's own time, which is what the limit counts (not the kernel's)."""
+    end = os.times().user + seconds
+    while os.times().user < end:
+        sum(range(100_000))
+
+
+def delete_slowly_and_go_on() -> None:
+    with _limited():
+        _Slow()
+        spin(1.0)
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_a_limit_that_is_exceeded_while_an_object_is_deleted_still_holds() -> None:
+    with pytest.raises(_TooLongError):
+        delete_slowly_and_go_on()
+    assert gc.isenabled()
+
+
+def test_garbage_of_others_takes_none_of_the_time() -> None:
+    cycle: list[Any] = [_Slow()]
+    cycle.append(cycle)
+    del cycle
+    with _limited():
+        waste = [[number] for number in range(gc.get_threshold()[0] * 2)]
+    assert len(waste) > 0
+    gc.collect()
