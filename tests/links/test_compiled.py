@@ -83,3 +83,28 @@ def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path) -> None:
     assert printed == "1"
     assert said.count("compiled code cannot be kept") == 1
     assert "SMARTICLES_CACHE_DIR" in said
+
+
+def test_a_function_is_linked_that_its_first_caller_never_reaches(tmp_path: Path) -> None:
+    # LLVM removes the loop of `never`, so that `never` names `smaller` as its part but does not call it.
+    program = """
+from dem.engine.links.compiler import callable_from_python, part
+smaller = part(lambda a, b: min(a, b) + 1.0)
+@part
+def often(a, b):
+    return 2.0 * smaller(a, b)
+@part
+def never(a, b):
+    total = a - b
+    for _ in range(0):
+        total += smaller(b, a)
+    return total
+@callable_from_python
+def one(a, b):
+    return often(a, b) + never(a, b)
+@callable_from_python
+def other(a, b):
+    return never(a, b) + often(a, b)
+print(one(1.0, 2.0), other(1.0, 2.0))
+"""
+    assert run(tmp_path, program)[0] == "3.0 3.0"

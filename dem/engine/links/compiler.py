@@ -41,14 +41,19 @@ class _KernelLibrary(JITCodeLibrary):
     """Code of a kernel and of all functions that it calls directly or indirectly."""
 
     def finalize(self) -> None:
-        found: dict[Any, None] = {}
-        waiting = list(self._linking_libraries)
-        while waiting:
-            library = waiting.pop()
-            if library not in found:
-                found[library] = None
-                waiting += library._linking_libraries if isinstance(library, _PartLibrary) else []
-        self._linking_libraries = list(found)
+        # LLVM leaves out what nothing calls that was linked before, so that callers come before what they call.
+        order: dict[Any, None] = {}
+
+        def add_after_callees(library: Any) -> None:
+            if library not in order:
+                if isinstance(library, _PartLibrary):
+                    for called in library._linking_libraries:
+                        add_after_callees(called)
+                order[library] = None
+
+        for library in self._linking_libraries:
+            add_after_callees(library)
+        self._linking_libraries = list(reversed(order))
         super().finalize()
 
     def _optimize_final_module(self) -> None:
