@@ -78,6 +78,7 @@ LOST = "peak force lost over w/2 beyond the peak [-]"
 HELD_FAST, LIMIT = "held fast [-]", "force limit over n W_s [-]"
 CARRIED, BREAK = "carried off [-]", "lowest points of what is carried off, before [m]"
 BEFORE, ABOVE = "load before the pull over n W_s [-]", "smarticles above the hook [-]"
+RESIDUAL = "energy residual over dissipated in the pull [-]"
 TOP, KEPT = "height of 95 % [m]", "com height without over with the wall [-]"
 
 QUANTITIES = declare(
@@ -96,6 +97,7 @@ QUANTITIES = declare(
         ),
         BREAK: ("broke at [mm]", ".1f", "mean height, before the pull, of the lowest points of the part carried off"),
         ABOVE: ("above the hook", ".2f", "share of smarticles with the centre of mass above the hook before the pull"),
+        RESIDUAL: ("", ".2g", "error of the energy ledger over the pull, over the energy dissipated meanwhile"),
         TOP: ("height [mm]", ".1f", "height below which 95 % of the material lies before the pull"),
         KEPT: ("kept without wall", ".3f", "height of the centre of mass before the pull over that with the wall"),
         CROSSINGS: ("⟨N⟩", ".2f", "links of others through a smarticle's plane at rest before the wall went"),
@@ -137,6 +139,7 @@ def measure(run: Run) -> Row:
         CROSSINGS: table.loc[rest]["crossings mean [-]"],
         ABOVE: float((centres - before.floor_z > upper).mean()),
         TOP: level.top,
+        RESIDUAL: pull.residual,
         KEPT: level.mean_com / heights(walled.vertices, floor_z=walled.floor_z).mean_com,
         PEAK: highest.force / weight,
         RAISED: highest.raised,

@@ -38,6 +38,8 @@ class HookPull:
     held: Floats = field(repr=False)
     before: float  #: Mean force on the upper hook before the pull [N]: weight on it; negative if pushed up
     engine_work: float  #: Work of the hook on the smarticles by the engine's energy ledger [J]; NaN if not recorded
+    #: Error of the energy ledger over the pull, over the energy dissipated meanwhile [-]; NaN without a ledger
+    residual: float
 
     @property
     def times(self) -> Floats:
@@ -84,14 +86,18 @@ def read_pull(run: Run, series: Series, phase: int) -> HookPull:
     span = np.concatenate([[inside[0] - 1], inside])
     resting = force[: inside[0]][series["phase"][: inside[0]] == phase - 1]
     resting = resting[np.isfinite(resting)][-_samples(END, interval_of(series.time[span]), len(inside)) :]
-    work = series.data.get("container_work_J")
+    changes = {
+        name: float(series[name][span[-1]] - series[name][span[0]]) if name in series.data else math.nan
+        for name in ("container_work_J", "energy_residual_J", "dissipated_energy_J")
+    }
     return HookPull(
         edges=series.time[span] - series.time[span[0]],
         raised=height[span] - height[span[0]],
         force=force[inside],
         held=series["hook_lower_force_N"][inside, 2],
         before=float(resting.mean()) if len(resting) else math.nan,
-        engine_work=math.nan if work is None else float(work[span[-1]] - work[span[0]]),
+        engine_work=changes["container_work_J"],
+        residual=changes["energy_residual_J"] / (changes["dissipated_energy_J"] or math.nan),
     )
 
 
