@@ -104,7 +104,6 @@ QUANTITIES = declare(
         FREE_TIME: ("", ".3g", "time since the pull began at which it came free; empty where it did not"),
         LEFT: ("load at the end", ".3f", f"mean force over the last {END:g} s of the pull"),
         BEFORE: ("", ".3g", f"mean force on the hook over the last {END:g} s before the pull"),
-        RESIDUAL: ("", ".2g", "error of the energy ledger over the pull, over the energy dissipated meanwhile"),
         ABOVE: ("above the hook", ".2f", "share of smarticles with the centre of mass above the hook before the pull"),
         CROSSINGS: ("⟨N⟩", ".2f", "⟨N⟩ at rest before the pull: links of others through a smarticle's plane"),
         PHI: ("", ".3g", "packing fraction at rest before the pull"),

@@ -97,7 +97,6 @@ QUANTITIES = declare(
         ),
         BREAK: ("broke at [mm]", ".1f", "mean height, before the pull, of the lowest points of the part carried off"),
         ABOVE: ("above the hook", ".2f", "share of smarticles with the centre of mass above the hook before the pull"),
-        RESIDUAL: ("", ".2g", "error of the energy ledger over the pull, over the energy dissipated meanwhile"),
         TOP: ("height [mm]", ".1f", "height below which 95 % of the material lies before the pull"),
         KEPT: ("kept without wall", ".3f", "height of the centre of mass before the pull over that with the wall"),
         CROSSINGS: ("⟨N⟩", ".2f", "links of others through a smarticle's plane at rest before the wall went"),
