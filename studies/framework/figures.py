@@ -210,6 +210,8 @@ class Means:
                     )
         self._label(axes, quantity)
         axes.set_xscale("log" if self.log_x else "linear")
+        if len(places := self.transform(table[self.x]).dropna().unique()) == 1:
+            axes.set_xticks(places)  # series are shifted from it, and ticks between would look like values
         if self.log and positive:
             axes.set_yscale("log")
         elif positive:
