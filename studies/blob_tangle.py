@@ -6,8 +6,8 @@ many loops between reversals (γ = α/2πλ) tangle the worms, few loops untangl
 whose preferred curvature turns about their axis and reverses at random times.
 
 The model assumes the same γ of all worms, and turns of helical bends in place of a head that leads the body. It has no
-swimming, no sense of touch and no escape. A dish holds the blob together, so that crossing numbers say how dense it is
-as well; what a tangle is good for is how many of its worms come along with an end piece, as in the study `blob-lift`.
+swimming, no sense of touch and no escape. A dish holds the blob together, so that crossing numbers also say how dense
+it is; the share of worms that come along with an end piece, as in the study `blob-lift`, says how well they hold.
 """
 
 import math
