@@ -5,7 +5,8 @@ model each worm's head turns in loops at a rate α, and reverses the sense of it
 many loops between reversals (γ = α/2πλ) tangle the worms, few loops untangle them. Here worms are flexible filaments
 whose preferred curvature turns about their axis and reverses at random times.
 
-The model assumes the same γ of all worms, and turns of helical bends in place of a head that leads the body. It has no
+The model assumes the same γ of all worms, and turns of helical bends in place of a head that leads the body. A free
+filament makes these turns by rolling about its axis, not by loops in space, as worms with bristles may. It has no
 swimming, no sense of touch and no escape. A dish holds the blob together, so that crossing numbers also say how dense
 it is; the share of worms that come along with an end piece, as in the study `blob-lift`, says how well they hold.
 """
@@ -73,7 +74,7 @@ def _rises(name: str, says: str, quantity: str, stage: str) -> Finding:
     return slope(name, says, quantity, DECADES, rows=_in(stage))
 
 
-def _crossings_over_time(stage: str) -> Histories:
+def _crossings_over_time(stage: str, note: str) -> Histories:
     return Histories(
         name=f"{stage}_time",
         history=_history,
@@ -83,7 +84,7 @@ def _crossings_over_time(stage: str) -> Histories:
         quantities={"": "crossing number of a worm with all others [-]"},
         width=0.2,
         marks=(6.0,),
-        notes=("Worms turn slowly up to the broken line. Then they hold their bends (tangling), or turn fast (un-).",),
+        notes=(note,),
     )
 
 
@@ -133,14 +134,14 @@ STUDY = Study(
     figures=(
         Means(
             name="lifted_turns",
-            quantities=[QUANTITIES[SHARE], QUANTITIES[OTHERS], QUANTITIES[CROSSINGS]],
+            quantities=[QUANTITIES[SHARE], QUANTITIES[OTHERS]],
             x=TURNS,
             x_label="turns between reversals γ [-]",
             log_x=True,
             split=_by_stage,
         ),
-        _crossings_over_time(TANGLING),
-        _crossings_over_time(UNTANGLING),
+        _crossings_over_time(TANGLING, "Worms turn slowly up to the broken line, then hold their bends."),
+        _crossings_over_time(UNTANGLING, "Worms turn slowly, with γ = 1, up to the broken line, then fast."),
     ),
     remarks=(
         "Worms are filaments of 30 × 0.8 mm in water that bend into helices (250 1/m, wavelength 60 mm); these turn at "
