@@ -26,6 +26,7 @@ from studies.blob_lift import CROSSINGS, OTHERS, QUANTITIES, SHARE
 from studies.blob_lift import measure as measure_lift
 from studies.framework.figures import Histories, History, Means, Series, marker, one_by_one
 from studies.framework.findings import Finding, mean, slope
+from studies.framework.provenance import Reference
 from studies.framework.runs import Key, Quantity, Row, phase_of
 from studies.framework.study import Study
 
@@ -148,4 +149,9 @@ STUDY = Study(
         "0.5 Hz while worms tangle, and at 2 Hz while they untangle.",
     ),
     pictured={"tangle_turns": 3},
+    reference=Reference(
+        statement="abstract of Patil et al., Science 2023, DOI 10.1126/science.ade7759, and its summary in Physics Today, "
+        "DOI 10.1063/PT.3.5261; no data of theirs",
+        facts={"doi": "10.1126/science.ade7759", "what": "statements in the abstract, and in 10.1063/PT.3.5261"},
+    ),
 )
