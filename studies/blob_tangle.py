@@ -150,8 +150,8 @@ STUDY = Study(
     ),
     pictured={"tangle_turns": 3},
     reference=Reference(
-        statement="abstract of Patil et al., Science 2023, DOI 10.1126/science.ade7759, and its summary in Physics Today, "
-        "DOI 10.1063/PT.3.5261; no data of theirs",
+        statement="abstract of Patil et al., Science 2023, DOI 10.1126/science.ade7759, and its summary in Physics "
+        "Today, DOI 10.1063/PT.3.5261; no data of theirs",
         facts={"doi": "10.1126/science.ade7759", "what": "statements in the abstract, and in 10.1063/PT.3.5261"},
     ),
 )
