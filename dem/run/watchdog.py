@@ -96,18 +96,20 @@ class Watchdog:
         points = positions[:, None] if points is None else points
         above = points[..., 2] - floor
         outside: Flags = np.less(above, 0)
-        height = math.inf
+        out = np.zeros(len(positions), dtype=bool)
         if raised is not None:
             height = self.cylinder.height
             corners = self.cylinder.radii(above - raised) * (self.cylinder.corner_radius / self.cylinder.radius)
-            outside |= (np.hypot(points[..., 0], points[..., 1]) > corners) & (above < height)
-            height += raised
+            beyond = (np.hypot(points[..., 0], points[..., 1]) > corners) & (above < height)
+            # The wall's upper edge holds nothing: what leans over it is on its way out.
+            out = (heights > height + raised) | (beyond.any(axis=1) & (above > height).any(axis=1))
+            outside |= beyond & ~out[:, None]
         reject(outside.any(axis=1), time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
         reject(
-            heights > height,
+            out,
             time,
             f"thrown out over the wall of {self.cylinder.height:.3g} m",
-            "raise container.height_m or shake less",
+            "raise container.height_m, or shake or throw less",
         )
 
     def check_depths(self, overlaps: Overlaps, *, time: float) -> None:

@@ -52,7 +52,7 @@ LEFT = "left through the wall or the floor; raise fidelity.stiffness_N_per_m"
         ),
         ("positions", (1, slice(2)), [0.02, 0.02], LEFT),
         ("positions", (1, 2), -1e-6, LEFT),
-        ("positions", (1, 2), 0.101, "thrown out over the wall of 0.1 m; raise container.height_m or shake less"),
+        ("positions", (1, 2), 0.101, "thrown out over the wall of 0.1 m; raise container.height_m, or shake or throw less"),
     ],
 )
 def test_each_cause_stops_the_run(values: str, place: Any, value: Any, text: str) -> None:
@@ -61,6 +61,15 @@ def test_each_cause_stops_the_run(values: str, place: Any, value: Any, text: str
     with pytest.raises(RunError) as caught:
         check(state)
     assert str(caught.value) == f"at t = 1.2500 s: 1 smarticle(s) (1): {text}"
+
+
+def test_what_leans_over_the_upper_edge_of_the_wall_is_thrown_out() -> None:
+    points = np.tile([0.0, 0.0, 0.05], (4, 3, 1))
+    points[1] = [[0.02, 0, 0.09], [0.025, 0, 0.098], [0.028, 0, 0.106]]
+    for top, text in ((0.106, "thrown out over the wall of 0.1 m"), (0.0999, "left through the wall")):
+        points[1, 2, 2] = top
+        with pytest.raises(RunError, match=text):
+            WATCHDOG.check(healthy(), floor=0.0, time=1.25, points=points)
 
 
 def test_broken_hinge_is_named_with_its_gap() -> None:
