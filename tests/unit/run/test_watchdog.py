@@ -52,7 +52,10 @@ LEFT = "left through the wall or the floor; raise fidelity.stiffness_N_per_m"
         ),
         ("positions", (1, slice(2)), [0.02, 0.02], LEFT),
         ("positions", (1, 2), -1e-6, LEFT),
-        ("positions", (1, 2), 0.101, "thrown out over the wall of 0.1 m; raise container.height_m, or shake or throw less"),
+        (
+            *("positions", (1, 2), 0.101),
+            "thrown out over the wall of 0.1 m; raise container.height_m, or shake or throw less",
+        ),
     ],
 )
 def test_each_cause_stops_the_run(values: str, place: Any, value: Any, text: str) -> None:
