@@ -86,6 +86,17 @@ def test_broken_hinge_is_named_with_its_gap() -> None:
             dog.check(healthy(), floor=0.0, time=1.25, gaps=gaps)
 
 
+def test_a_run_warns_of_contacts_deeper_than_half_a_link_at_its_end() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=9e-4, pressed=5e-4)
+    assert dog.warn_of_depth(5e-4, 1.25) is None
+    warning = dog.warn_of_depth(8.5e-4, 1.25)
+    assert warning is not None
+    assert warning.startswith(
+        "at t = 1.2500 s contacts were 0.00085 m deep, more than 0.0005 m, half of a link's width"
+    )
+    assert "at least 3.4 times" in warning
+
+
 def test_deep_contacts_are_named() -> None:
     dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=6e-4)
     deep = np.zeros(4, dtype=bool)
