@@ -122,6 +122,12 @@ ENERGY = 0.01  # largest excess of energy, over the supplied energy
 INSIDE = 1e-3  # least distance of a crossing from the ends of a segment, over the length of the segment
 
 
+def segments(vertices: Array) -> Array:
+    """Return the ends (3N, 2, 3) [m] of the axes of all links, from vertices (N, 4, 3) [m]."""
+    found: Array = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3)
+    return found
+
+
 def surface(ends: Array, thickness: float) -> tuple[Array, Array]:
     """Return points (M, 3) [m] on the axes of all links, and radii (M,) [m] of spheres that links contain.
 
