@@ -128,13 +128,12 @@ def segments(vertices: Array) -> Array:
     return found
 
 
-def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
+def surface(ends: Array, thickness: float) -> tuple[Array, Array]:
     """Return points (M, 3) [m] on the axes of all links, and radii (M,) [m] of spheres that links contain.
 
     Points are the ends of each axis, with radius 0, and the points thickness/2 from the ends, with radius thickness/2.
-    The spheres lie inside the link, whether its ends are square or round. Vertices (N, 4, 3) and thickness are in [m].
+    The spheres lie inside the link, whether its ends are square or round. Ends (M, 2, 3) and thickness are in [m].
     """
-    ends = segments(vertices)
     along = ends[:, 1] - ends[:, 0]
     length = np.linalg.norm(along, axis=-1)
     wide = length > thickness
@@ -144,20 +143,19 @@ def surface(vertices: Array, thickness: float) -> tuple[Array, Array]:
     return points, np.repeat([0.0, thickness / 2], [2 * len(ends), len(inner)])
 
 
-def crossings(before: Array, after: Array) -> list[tuple[int, int]]:
-    """Find links of different smarticles whose axes passed through each other between two frames.
+def crossings(one: Array, two: Array, body: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """Find links of different bodies whose axes passed through each other between two frames.
 
-    Vertices (N, 4, 3) [m] are assumed to move along straight lines. When two axes pass through each other, the volume
-    of the tetrahedron of their four ends changes sign, and the common point lies within both axes. The result
-    has pairs of indices of links in `segments`.
+    Ends of axes (M, 2, 3) [m] are assumed to move along straight lines; link m belongs to body[m]. When two axes pass
+    through each other, the volume of the tetrahedron of their four ends changes sign, and the common point lies within
+    both axes. The result has pairs of links.
     """
-    one, two = segments(before), segments(after)
     # Links without length (l/w = 0) cannot cross.
     long = np.minimum(np.ptp(one, axis=1), np.ptp(two, axis=1)).max(axis=-1) > 0
     low = np.minimum(one, two).min(axis=1)
     high = np.maximum(one, two).max(axis=1)
     i, j = np.triu_indices(len(one), k=1)
-    near = (i // 3 != j // 3) & long[i] & long[j]
+    near = (body[i] != body[j]) & long[i] & long[j]
     i, j = i[near], j[near]
     near = ((low[i] <= high[j]) & (low[j] <= high[i])).all(axis=-1)
     i, j = i[near], j[near]
@@ -217,23 +215,23 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
     crossed: set[tuple[int, int]] = set()
     finite, first, last = True, None, None
     for frame in read_frames(path):
-        vertices = frame.vertices
-        finite &= bool(np.isfinite(vertices).all())
+        ends = frame.segments
+        finite &= bool(np.isfinite(ends).all())
         if not finite:
             wrong.append(f"no number in the frame at {frame.time:.4f} s")
             break
-        points, inset = surface(vertices, thickness)
+        points, inset = surface(ends, thickness)
         height = points[:, 2] - frame.floor_z - inset
         out = np.hypot(points[:, 0], points[:, 1]) + inset - radius
         floor_depth = max(floor_depth, float((-height).max()) / thickness)
         wall_depth = max(wall_depth, float(np.where(height < wall, out, -np.inf).max()) / thickness)
         if last is not None:
-            count = min(len(last), len(vertices))
-            moved = max(moved, float(np.linalg.norm(vertices[:count] - last[:count], axis=-1).max()) / thickness)
-            pairs = crossings(last[:count], vertices[:count])
+            count = min(len(last), len(ends))
+            moved = max(moved, float(np.linalg.norm(ends[:count] - last[:count], axis=-1).max()) / thickness)
+            pairs = crossings(last[:count], ends[:count], frame.body[:count])
             crossed.update(pairs)
             first = first if first is not None or not pairs else frame.time
-        last = vertices
+        last = ends
     most = accepted_depth(scene) / thickness
     if floor_depth > most:
         wrong.append(f"{floor_depth:.2f} thicknesses below the floor")

@@ -7,8 +7,10 @@ from dem.errors import InputError
 from dem.scene.reading import parse_scene
 from validation.extremes import accepted_depth, crossings, draw_scene, surface
 
-ALONG_X = np.array([[-3.0, 0, 0], [-1, 0, 0], [1, 0, 0], [3, 0, 0]])
-ALONG_Y = ALONG_X[:, [1, 0, 2]]
+VERTICES = np.array([[-3.0, 0, 0], [-1, 0, 0], [1, 0, 0], [3, 0, 0]])
+ALONG_X = np.stack([VERTICES[:-1], VERTICES[1:]], axis=1)
+ALONG_Y = ALONG_X[..., [1, 0, 2]]
+BODY = np.repeat([0, 1], 3)
 
 
 @pytest.mark.parametrize(
@@ -23,13 +25,18 @@ ALONG_Y = ALONG_X[:, [1, 0, 2]]
 def test_axes_that_pass_through_each_other_are_found(
     start: tuple[float, ...], end: tuple[float, ...], pairs: list[tuple[int, int]]
 ) -> None:
-    before, after = (np.array([ALONG_X, ALONG_Y + np.array(way)]) for way in (start, end))
-    assert crossings(before, after) == pairs
+    before, after = (np.concatenate([ALONG_X, ALONG_Y + np.array(way)]) for way in (start, end))
+    assert crossings(before, after, BODY) == pairs
 
 
 def test_a_link_without_length_crosses_nothing() -> None:
-    above = np.tile([0.0, 0.0, 1.0], (4, 1))
-    assert crossings(np.array([ALONG_X, above]), np.array([ALONG_X, -above])) == []
+    above = np.tile([0.0, 0.0, 1.0], (3, 2, 1))
+    assert crossings(np.concatenate([ALONG_X, above]), np.concatenate([ALONG_X, -above]), BODY) == []
+
+
+def test_links_of_one_body_may_cross() -> None:
+    before, after = (np.concatenate([ALONG_X, ALONG_Y + np.array([0, 0, z])]) for z in (1, -1))
+    assert crossings(before, after, np.zeros(6, np.int64)) == []
 
 
 def test_scenes_are_drawn_alike_and_some_are_valid() -> None:
@@ -46,9 +53,9 @@ def test_scenes_are_drawn_alike_and_some_are_valid() -> None:
 
 def test_a_link_that_stands_or_lies_on_the_floor_is_not_below_it() -> None:
     thickness = 0.5
-    standing, lying = ALONG_X[:, [2, 1, 0]] + np.array([0, 0, 3]), ALONG_X + np.array([0, 0, thickness / 2])
-    for vertices, depth in ((standing, 0.0), (lying, 0.0), (lying - [0, 0, 0.2], 0.2)):
-        points, inset = surface(vertices[None], thickness)
+    standing, lying = ALONG_X[..., [2, 1, 0]] + np.array([0, 0, 3]), ALONG_X + np.array([0, 0, thickness / 2])
+    for ends, depth in ((standing, 0.0), (lying, 0.0), (lying - [0, 0, 0.2], 0.2)):
+        points, inset = surface(ends, thickness)
         assert (inset - points[:, 2]).max() == pytest.approx(depth)
 
 

@@ -13,6 +13,7 @@ from dem.phases.travel import check_from_now
 from dem.setting.part import Part, Speed
 from dem.setting.vibration import Vibration
 
+OVERSHOT = 1.5  # stress at the end of a loading, over stress_Pa, from which on the phase warns
 PER_CHECK = 0.01  # longest way of the plate between two checks of the stress, in sphere diameters
 Stress = Annotated[float, Field(ge=1e-6, le=1e12)]
 
@@ -85,8 +86,9 @@ class Compress(Part, Phase):
         # `start`: height of the plate above the floor at the beginning [m]; `leg`: number of the loading (even) or
         # unloading (odd), `way`: distance of the plate below its start when the leg began [m], `begun` and `arrival`:
         # when it began, and when it ends in any case [s]. At the last check, `force_sum`: force on the plate summed
-        # over steps [N]; `step`: number of steps; `due`: time of the next check [s]. `touched`, `short`: for warnings.
-        numbers = dict.fromkeys(("way", "begun", "arrival", "force_sum", "due"), 0.0)
+        # over steps [N]; `step`: number of steps; `due`: time of the next check [s]. `touched`, `short`, and `most`,
+        # the largest stress [Pa]: for warnings.
+        numbers = dict.fromkeys(("way", "begun", "arrival", "force_sum", "due", "most"), 0.0)
         return {"start": None, "leg": 0, "step": 0, "touched": False, "short": False, **numbers}
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
@@ -125,6 +127,7 @@ class Compress(Part, Phase):
         stress = (float(boundaries.plate_sum[2]) - memory["force_sum"]) / steps / _area(stage.scene)
         self._check_from_now(memory, engine)
         memory["touched"] = memory["touched"] or stress > 0
+        memory["most"] = max(memory.get("most", 0.0), stress)
         up = memory["leg"] % 2
         if up:
             ended = stress <= self.unload_stress_Pa
@@ -147,6 +150,12 @@ class Compress(Part, Phase):
             memory["warning"] = (
                 f"a loading ended at strain {self.strain:g} before stress_Pa = {self.stress_Pa:g} Pa was reached; "
                 "raise strain or lower stress_Pa"
+            )
+        elif self.stress_Pa is not None and memory["most"] > OVERSHOT * self.stress_Pa:
+            memory["warning"] = (
+                f"the stress rose to {memory['most']:.3g} Pa before the plate stopped at stress_Pa = "
+                f"{self.stress_Pa:g} Pa; lower speed_m_per_s, or raise vibration.frequency_hz: stresses are averaged "
+                "over whole periods"
             )
         return False
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from dem.engine.effect import EffectName
@@ -51,7 +52,9 @@ class PullHook(Part, Phase):
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
         hooks = scene.hooks
-        return () if hooks is None else (*self._over_the_pile(scene, hooks), *self._held_by_one(scene, hooks))
+        if hooks is None:
+            return ()
+        return *self._over_the_pile(scene, hooks), *self._held_by_one(scene, hooks), *self._near_the_wall(scene, hooks)
 
     def _over_the_pile(self, scene: SceneView, hooks: Hooks) -> Sequence[str]:
         if scene.container.tiers is not None or hooks.upper_height_m - hooks.side_m / 2 < scene.loose_height:
@@ -73,6 +76,17 @@ class PullHook(Part, Phase):
             f"hooks.upper_height_m: the hooks are {across:.3g} m from outside to outside, less than a smarticle's "
             f"inner length, {inside:.3g} m: one smarticle can hold both hooks, and then only the contacts give way; "
             f"set them at least {1.005 * (inside - hooks.side_m):.3g} m apart, or give pull-hook a force_limit_N",
+        )
+
+    def _near_the_wall(self, scene: SceneView, hooks: Hooks) -> Sequence[str]:
+        highest = np.array([hooks.upper_height_m + self.distance_m])
+        gap = float(scene.cylinder.inner_radii(highest)[0]) - hooks.crosses[1].reach
+        if gap >= scene.sphere_diameter:
+            return ()
+        return (
+            f"hooks.length_m: the bars of the upper hook end {gap:.3g} m before the wall, less than a link's width, "
+            f"{scene.sphere_diameter:.3g} m, so that links are wedged there and stop the run; use at most "
+            f"{0.995 * (hooks.length_m - 2 * (scene.sphere_diameter - gap)):.3g} m or a wider container",
         )
 
     def pushing_speed(self, gravity: float) -> float:

@@ -24,6 +24,7 @@ from dem.record.series import SeriesWriter
 from dem.run.recorder import Recorder
 from dem.run.sampler import Sampler
 from dem.run.watchdog import LOWER_STEP, Watchdog
+from dem.scene import stiffness
 from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
 
@@ -36,6 +37,8 @@ SPEED_MARGIN = 5.0  # limit of speeds, over the speed of a fall over the contain
 DEPTH_LIMIT = 0.5
 # On links, whose contacts stiffen without bound before axes meet; under the weight of 100 piles overlaps are smaller.
 BARRIER_LIMIT = 0.9
+# Overlap in sphere diameters from which on a run on links warns at its end: the largest one that `plan` expects.
+PRESSED = stiffness.LIMIT
 # Fraction of the dissipation that the energy ledger of links may miss; on YADE it depends on the sampling interval.
 MISSED_LIMIT = 0.05
 # Limit of an unexplained rise of the energy: what lifts all smarticles by so many sphere diameters, a height below the
@@ -129,6 +132,7 @@ def build_watchdog(scene: Scene) -> Watchdog:
         way_out=DAMP_SHAFTS if _rings(scene) else LOWER_STEP,
         gap=(PIN_LIMIT if scene.mixture is not None and scene.mixture.jointed else GAP_LIMIT) * diameter,
         depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,
+        pressed=PRESSED * diameter if scene.smooth else math.inf,
         missed=MISSED_LIMIT if scene.smooth else math.inf,
         # Without gravity no height corresponds to an energy.
         energy=mass * max(RISE_LIMIT * diameter * gravity, KEPT_WITHIN * fastest**2 / 2) if gravity else math.inf,

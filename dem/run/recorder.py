@@ -42,6 +42,7 @@ class Recorder:
     sphere_every: int = 1  #: Samples between files of spheres
     samples: int = 0  #: Number of samples so far
     residual: str | None = None  #: Warning about the energy ledger at the last sample, printed at the end of the run
+    deepest: tuple[float, float] = (0.0, 0.0)  #: Deepest overlap at a check so far [m], and the time of that check [s]
     next_step: int = 0  #: Number of the step of the next sample
 
     def record(self, engine: Engine, phase: int) -> None:
@@ -77,14 +78,15 @@ class Recorder:
         state, time, watchdog = state or engine.state(), engine.time, self.watchdog
         floor, raised, extremes = engine.boundaries.floor, engine.boundaries.raised, engine.extremes(state)
         if extremes is not None and watchdog.within_limits(extremes, floor=floor, raised=raised):
-            elastic = extremes.elastic_energy
+            elastic, deepest = extremes.elastic_energy, extremes.deepest
         else:
             hinges = engine.motors.gaps() if engine.motors.articulated else None
             gaps = state.gaps if isinstance(state, LinkageState) else hinges
             watchdog.check(state, floor=floor, time=time, points=self.points(state), raised=raised, gaps=gaps)
             overlaps = engine.overlaps(watchdog.depth)
             watchdog.check_depths(overlaps, time=time)
-            elastic = overlaps.elastic_energy
+            elastic, deepest = overlaps.elastic_energy, overlaps.deepest
+        self.deepest = max(self.deepest, (deepest, time))
         given = engine.ledger.given + engine.motors.work
         energy = state.kinetic_energy + state.potential_energy(engine.gravity, 0.0) - given
         watchdog.check_energy(state, energy=energy, elastic=elastic, time=time)
@@ -93,7 +95,8 @@ class Recorder:
     def memory(self) -> dict[str, Any]:
         """Plain data of the recorder's present state, for `restore`."""
         times = {name: writer.times for name, writer in self._writers()}
-        return {"samples": self.samples, "next_step": self.next_step, **times, "series": dict(self.sampler.memory)}
+        counts = {"samples": self.samples, "next_step": self.next_step, "deepest": list(self.deepest)}
+        return {**counts, **times, "series": dict(self.sampler.memory)}
 
     def _writers(self) -> list[tuple[str, FrameWriter]]:
         named = (("frames", self.frames), ("forces", self.forces), ("spheres", self.spheres))
@@ -102,6 +105,8 @@ class Recorder:
     def restore(self, memory: Mapping[str, Any], columns: Mapping[str, NDArray[Any]]) -> None:
         """Restore the state that `memory` returned: remove later frames, and write the series `columns`."""
         self.samples, self.next_step = index(memory["samples"]), index(memory["next_step"])
+        deepest, time = memory.get("deepest", self.deepest)
+        self.deepest = float(deepest), float(time)
         self.truncate(memory)
         self.sampler.memory = dict(memory["series"])
         self.check_files()

@@ -65,8 +65,10 @@ class Simulation:
             self.recorder.watch(self.engine)
         self.recorder.series.write()
         self._check_files()
-        if self.recorder.residual:
-            self.warn(self.recorder.residual)
+        recorder = self.recorder
+        for warning in (recorder.residual, recorder.watchdog.warn_of_depth(*recorder.deepest)):
+            if warning:
+                self.warn(warning)
         return tuple(Phase(**entry) for entry in self._performed)
 
     def _run_phase(self) -> None:

@@ -30,6 +30,7 @@ class Watchdog:
     way_out: str = LOWER_STEP  #: Advice where a speed is larger
     gap: float = math.inf  #: Largest gap of a hinge [m]; beyond it the hinge is broken
     depth: float = math.inf  #: Largest overlap [m]; beyond it contacts no longer keep bodies apart
+    pressed: float = math.inf  #: Overlap [m] above which a run warns at its end: bodies stay apart, but are too soft
     energy: float = math.inf  #: Largest increase of the energy without work [J]; beyond it the simulation is unstable
     missed: float = math.inf  #: Largest residual of the energy ledger, over the dissipation [1]
     _ceiling: float = math.inf  # limit of kinetic and potential energy less the work done [J]
@@ -96,18 +97,20 @@ class Watchdog:
         points = positions[:, None] if points is None else points
         above = points[..., 2] - floor
         outside: Flags = np.less(above, 0)
-        height = math.inf
+        out = np.zeros(len(positions), dtype=bool)
         if raised is not None:
             height = self.cylinder.height
             corners = self.cylinder.radii(above - raised) * (self.cylinder.corner_radius / self.cylinder.radius)
-            outside |= (np.hypot(points[..., 0], points[..., 1]) > corners) & (above < height)
-            height += raised
+            beyond = (np.hypot(points[..., 0], points[..., 1]) > corners) & (above < height)
+            # The wall's upper edge holds nothing: what leans over it is on its way out.
+            out = (heights > height + raised) | (beyond.any(axis=1) & (above > height).any(axis=1))
+            outside |= beyond & ~out[:, None]
         reject(outside.any(axis=1), time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
         reject(
-            heights > height,
+            out,
             time,
             f"thrown out over the wall of {self.cylinder.height:.3g} m",
-            "raise container.height_m or shake less",
+            "raise container.height_m, or shake or throw less",
         )
 
     def check_depths(self, overlaps: Overlaps, *, time: float) -> None:
@@ -132,6 +135,16 @@ class Watchdog:
                 else "give the hook more room: a smaller hooks.length_m or a wider container"
             )
         reject(overlaps.deep, time, cause, way_out)
+
+    def warn_of_depth(self, deepest: float, time: float) -> str | None:
+        """Return a warning for the end of a run whose deepest contact [m] was at `time` [s], or None."""
+        if not deepest > self.pressed:
+            return None
+        return (
+            f"at t = {time:.4f} s contacts were {deepest:.3g} m deep, more than {self.pressed:.3g} m, half of a link's "
+            "width: the pile is denser than one of bodies that keep their shape; raise fidelity.stiffness_N_per_m, at "
+            f"least {2 * deepest / self.pressed:.2g} times, or load the pile less"
+        )
 
     def check_energy(self, state: PileState, *, energy: float, elastic: float, time: float) -> None:
         """Check that the energy has not increased by more than work and springs can explain.

@@ -81,6 +81,24 @@ def vibrating(segments: int, gravity: float, slowest: float, damping_time: float
     return {"times": np.array(times), "heights": np.array(heights)}
 
 
+def buckled(segments: int, slowest: float, shortening: float, gravity: float) -> np.ndarray:
+    """Load of a strut on pins whose ends come nearer by `shortening` and then stay, at three times [N]."""
+    rod = {**ROD, "segments": segments, "bending_time_s": 2 / slowest, "stretching_time_s": 1e-3}
+    engine = built(rod, **{"gravity_m_per_s2": gravity, "fidelity": {"base": "draft", "stiffness_N_per_m": 10}})
+    put(engine, (0.0, 0.0, 0.2))
+    filaments, states = inside(engine)
+    states[0].blockedDOFs = states[-1].blockedDOFs = "xyz"
+    time, loads = 10 / slowest, []
+    states[-1].vel = engine._yade.vector(-shortening / time, 0, 0)
+    engine.advance(round(time / engine.time_step))
+    states[-1].vel = engine._yade.vector(0, 0, 0)
+    for _ in range(3):
+        engine.advance(round(5 / slowest / engine.time_step))
+        bond = filaments._bonds[-1].phys
+        loads.append(abs(bond.normalForce[0] + bond.shearForce[0]))
+    return np.array(loads)
+
+
 def free(damped: bool, steps: int) -> dict[str, Any]:
     """Momentum, angular momentum and energies of a free, bent filament that tumbles and vibrates."""
     times = {"stretching_time_s": 1e-3, "bending_time_s": 0.02} if damped else {}

@@ -54,6 +54,15 @@ def test_a_cantilever_vibrates_and_decays_as_beam_theory_says(simulate: Simulate
         assert decay == pytest.approx(least, rel=0.01, abs=5e-4 * SLOWEST)
 
 
+def test_a_strut_buckles_at_eulers_load(simulate: Simulate) -> None:
+    # A weight that bends it by 1e-4 L. After buckling P/P_E = 1 + δ/2L for ends that come nearer by δ.
+    euler, short = math.pi**2 * B / L**2, 0.02
+    loads = simulate(filament_cases.buckled, 10, math.pi**2 * math.sqrt(B / MU / L**4), short * L, gravity(0.0077))
+    squeezed = euler / (E * math.pi * D**2 / 4)
+    assert loads[-1] == pytest.approx(loads[-2], rel=1e-3)
+    assert loads[-1] == pytest.approx(euler * (1 + (short - squeezed) / 2), rel=0.01)
+
+
 @pytest.mark.parametrize("damped", [False, True])
 def test_a_free_filament_keeps_momentum_and_accounts_for_energy(simulate: Simulate, *, damped: bool) -> None:
     found = simulate(filament_cases.free, damped, 10_000)

@@ -9,7 +9,7 @@ import pytest
 
 from dem.errors import InputError
 from postprocess.statistics.points import SEED
-from studies import blob_lift, blob_topple
+from studies import blob_lift, blob_tangle, blob_topple
 
 SHARES = (blob_lift.SHARE, blob_lift.OTHERS)
 
@@ -69,7 +69,36 @@ def test_findings_compare_the_quiet_blob_with_the_most_active_one_seed_by_seed()
     assert found[1].value.value == pytest.approx(0.67)
 
 
-@pytest.mark.parametrize(("study", "phase"), [(blob_lift, "lift"), (blob_topple, "release")])
+@pytest.mark.parametrize(("hertz", "stage"), [(0.0, ("tangling", 3.0)), (2.0, ("untangling", 0.1))])
+def test_a_run_is_about_the_last_stage_in_which_worms_turn(hertz: float, stage: tuple[str, float]) -> None:
+    acts = [{"turns_between_reversals": 3.0}, {"turns_between_reversals": 0.1, "frequency_hz": hertz}]
+    run: Any = SimpleNamespace(
+        phases=[
+            SimpleNamespace(index=k, type=name) for k, name in enumerate(("deposit", "wriggle", "wriggle", "lift"))
+        ],
+        scene={"phases": [{}, *acts, {}]},
+    )
+    assert blob_tangle._stages(run) == (1, *stage)
+
+
+def test_findings_on_reversals_are_slopes_per_decade_within_a_stage() -> None:
+    rows = [
+        {
+            blob_tangle.STAGE: stage, blob_tangle.TURNS: 10**x, blob_tangle.DECADES: x, blob_tangle.GAIN: 1.0 + x,
+            blob_lift.OTHERS: sign * 0.2 * x + 0.01 * seed, blob_lift.CROSSINGS: 30.0, SEED: seed,
+        }
+        for stage, sign in (("tangling", 1), ("untangling", -1))
+        for x in (-1.0, 0.0, 0.5)
+        for seed in (1, 2, 3)
+    ]  # fmt: skip
+    found = {one.id: one.judge(pd.DataFrame(rows)) for one in blob_tangle.STUDY.findings}
+    assert "+0.2 " in found["tangles"].ours
+    assert "-0.2 " in found["untangles"].ours
+    assert [str(found[name].verdict) for name in ("tangles", "untangles")] == ["found", "not found"]
+    assert "+0 " in found["uncrosses"].ours  # γ = 0.1 alone
+
+
+@pytest.mark.parametrize(("study", "phase"), [(blob_lift, "lift"), (blob_tangle, "lift"), (blob_topple, "release")])
 def test_other_runs_are_left_out(study: Any, phase: str) -> None:
     run: Any = SimpleNamespace(path="run", phases=[SimpleNamespace(index=0, type="deposit")])
     with pytest.raises(InputError, match=f"has no phase {phase}; leave it out"):

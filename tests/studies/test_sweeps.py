@@ -14,7 +14,7 @@ from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep, on_engine
 
 CODES = ("procedures", "fracture", "strength", "melting", "casting")
-FLEXIBLE = ("blob-lift", "blob-lift-map", "blob-topple", "blob-topple-map")  # of filaments, which links alone has
+FLEXIBLE = ("blob-lift", "blob-lift-map", "blob-tangle", "blob-topple", "blob-topple-map")  # of filaments, links alone
 AGAIN = {"gravish": 9, "melting": 8}
 
 

@@ -119,6 +119,14 @@ def test_a_plate_that_misses_its_aim_says_so(keys: dict[str, Any], said: str) ->
     assert "strain" in stage.memory["warning"]
 
 
+def test_a_plate_that_moves_far_in_a_period_of_the_vibration_says_how_large_the_stress_became() -> None:
+    stress, shaken = 1e3 * 0.002 / AREA, {"peak_acceleration_g": 0.0, "frequency_hz": 100.0}
+    _, _, stage = pressed(stress_Pa=stress, strain=0.5, vibration=shaken)
+    assert "warning" not in stage.memory
+    _, _, stage = pressed(stress_Pa=stress, strain=0.5, vibration={**shaken, "frequency_hz": 1.0})
+    assert f"before the plate stopped at stress_Pa = {stress:g} Pa; lower speed_m_per_s" in stage.memory["warning"]
+
+
 # -- grips -------------------------------------------------------------------------------------------------------------
 
 

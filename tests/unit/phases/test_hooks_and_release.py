@@ -7,6 +7,7 @@ import pytest
 from scenes import small
 
 from dem.phases.pull_hook import PullHook
+from dem.plan.outlook import warnings_of
 from dem.setting.hooks import Cross
 
 W, T2 = 0.0117, 0.5e-3
@@ -43,3 +44,12 @@ def test_the_wall_is_high_enough_for_the_hooks() -> None:
     # A pile that stands higher than the hooks needs no more than without them.
     many = {"count": 300}
     assert small({"hooks": {}, **many}).cylinder.height == small(many).cylinder.height
+
+
+def test_a_hook_that_leaves_a_gap_as_wide_as_a_link_at_the_wall_wedges_none() -> None:
+    changes = {"engine": "links", "hooks": {}, "count": 400, "phases": [DEPOSIT, PULL | {"force_limit_N": 1.0}]}
+    assert warnings_of(small(changes)) == ()
+    (warning,) = warnings_of(small(changes | {"hooks": {"length_m": 0.0455}}))
+    assert warning.startswith("hooks.length_m: the bars of the upper hook end 0.0006")
+    advised = float(warning.partition("use at most ")[2].partition(" m")[0])
+    assert warnings_of(small(changes | {"hooks": {"length_m": advised}})) == ()

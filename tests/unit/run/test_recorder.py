@@ -77,6 +77,7 @@ def test_frames_and_spheres_are_taken_every_so_many_samples_where_there_is_somet
 def test_restoring_its_memory_removes_later_files(tmp_path: Path) -> None:
     scene, engine, recorder = start(tmp_path)
     take(engine, recorder, 8)
+    recorder.deepest = (2e-4, 0.012)
     memory, columns, saved = json.loads(json.dumps(recorder.memory)), recorder.series.columns, engine.save(tmp_path)
     take(engine, recorder, 8)
     ends = files(tmp_path), recorder.series.columns
@@ -84,6 +85,7 @@ def test_restoring_its_memory_removes_later_files(tmp_path: Path) -> None:
     engine = EngineDouble.of(scene, DT)
     engine.load(saved, tmp_path)
     again.restore(memory, columns)
+    assert again.deepest == (2e-4, 0.012)
     assert {name: len(found) for name, found in files(tmp_path).items()} == {"frames": 3, "spheres": 2}
     take(engine, again, 8)
     assert files(tmp_path) == ends[0]
@@ -143,6 +145,7 @@ def test_where_extremes_are_enough_only_the_energy_is_checked_too(
     engine.deepest = recorder.watchdog.depth * 1.1
     monkeypatch.setattr(engine.boundaries, "floor", 0.99)
     recorder.watch(engine)  # by the extremes all is well
+    assert recorder.deepest == (0.0, engine.time)
     monkeypatch.setattr(engine.boundaries, "floor", 1.01)
     with pytest.raises(RunError, match="left through the wall or the floor"):
         recorder.watch(engine)

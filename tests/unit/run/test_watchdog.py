@@ -52,7 +52,10 @@ LEFT = "left through the wall or the floor; raise fidelity.stiffness_N_per_m"
         ),
         ("positions", (1, slice(2)), [0.02, 0.02], LEFT),
         ("positions", (1, 2), -1e-6, LEFT),
-        ("positions", (1, 2), 0.101, "thrown out over the wall of 0.1 m; raise container.height_m or shake less"),
+        (
+            *("positions", (1, 2), 0.101),
+            "thrown out over the wall of 0.1 m; raise container.height_m, or shake or throw less",
+        ),
     ],
 )
 def test_each_cause_stops_the_run(values: str, place: Any, value: Any, text: str) -> None:
@@ -61,6 +64,15 @@ def test_each_cause_stops_the_run(values: str, place: Any, value: Any, text: str
     with pytest.raises(RunError) as caught:
         check(state)
     assert str(caught.value) == f"at t = 1.2500 s: 1 smarticle(s) (1): {text}"
+
+
+def test_what_leans_over_the_upper_edge_of_the_wall_is_thrown_out() -> None:
+    points = np.tile([0.0, 0.0, 0.05], (4, 3, 1))
+    points[1] = [[0.02, 0, 0.09], [0.025, 0, 0.098], [0.028, 0, 0.106]]
+    for top, text in ((0.106, "thrown out over the wall of 0.1 m"), (0.0999, "left through the wall")):
+        points[1, 2, 2] = top
+        with pytest.raises(RunError, match=text):
+            WATCHDOG.check(healthy(), floor=0.0, time=1.25, points=points)
 
 
 def test_broken_hinge_is_named_with_its_gap() -> None:
@@ -72,6 +84,17 @@ def test_broken_hinge_is_named_with_its_gap() -> None:
         gaps[2, 1] = bad
         with pytest.raises(RunError, match=r"1\.2500 s: 1 smarticle\(s\) \(2\): links more than 0\.0002 m apart"):
             dog.check(healthy(), floor=0.0, time=1.25, gaps=gaps)
+
+
+def test_a_run_warns_of_contacts_deeper_than_half_a_link_at_its_end() -> None:
+    dog = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, depth=9e-4, pressed=5e-4)
+    assert dog.warn_of_depth(5e-4, 1.25) is None
+    warning = dog.warn_of_depth(8.5e-4, 1.25)
+    assert warning is not None
+    assert warning.startswith(
+        "at t = 1.2500 s contacts were 0.00085 m deep, more than 0.0005 m, half of a link's width"
+    )
+    assert "at least 3.4 times" in warning
 
 
 def test_deep_contacts_are_named() -> None:

@@ -35,7 +35,7 @@ from dem.engine.links.arrays import (
     Segments,
 )
 from dem.engine.links.compiler import inlined, kernel, part
-from dem.engine.links.contact.barrier import LONGEST, STRIDE, Step
+from dem.engine.links.contact.barrier import LONGEST, SLACK, STRIDE, Step
 from dem.engine.links.motion.planar import direction
 from dem.engine.links.shapes import INVERSE
 from dem.engine.links.vectors import Vector, add, along, cross, dot, put, put_more, scale, sub, vector
@@ -226,6 +226,21 @@ def _rates(one: Piece, two: Piece, bend: Bend, slope: float) -> Vector:
 
 
 @inlined
+def _resolve(step: Step, stiffness: float, damping: float) -> None:
+    """Increase `step.need` if a mode of vibration is too fast, or too strongly damped, for a time step.
+
+    Args:
+        step: `need` is increased.
+        stiffness: square of the mode's frequency [1/s²].
+        damping: rate at which dashpots slow the mode [1/s].
+    """
+    k, c = stiffness * step.whole * step.whole, damping * step.whole
+    # A step h is stable while K h² + 2 C h is up to 4, also one that is longer than needed by the `SLACK`.
+    if (k > RESOLVED * RESOLVED) | (SLACK * (SLACK * k + 2 * c) > 4.0):
+        step.need[0] = max(step.need[0], math.sqrt(k) / RESOLVED, 0.25 * SLACK * (c + math.sqrt(c * c + 4 * k)))
+
+
+@inlined
 def _push_node(
     filaments: Filaments, i: int, rod: Array, angle: Vector, one: Piece, two: Piece, ledger: Any, step: Step
 ) -> float:
@@ -259,13 +274,14 @@ def _push_node(
     else:
         _push_bend(filaments.damping, i, damping, one, two, bend)
     _push_bend(filaments.force, i, moments, one, two, bend)
-    # The energy stiffens as the angle θ grows: κ = 2 tan(θ/2), κ'² + κ κ'' = (1 + q) (1 + 3 q) with q = tan²(θ/2).
-    # The twist likewise, and what bends resists rolls that are not alike.
+    # The energy stiffens as the angle θ grows: κ = 2 tan(θ/2), κ'² + κ κ'' = (1 + q) (1 + 3 q) with q = tan²(θ/2), and
+    # κ'² = (1 + q)². The twist likewise.
     q, p = 0.25 * dot(bend.binormal, bend.binormal), slope - 1
-    twisted = rod[STIFFEST_TWIST] * (1 + p) * (1 + 3 * p) + 4 * q * stiffness / rod[AXIAL]
-    stiffest = step.whole * step.whole * max(rod[STIFFEST] * (1 + q) * (1 + 3 * q), twisted)
-    if stiffest > RESOLVED * RESOLVED:
-        step.need[0] = max(step.need[0], math.sqrt(stiffest) / RESOLVED)
+    _resolve(step, rod[STIFFEST] * (1 + q) * (1 + 3 * q), time * rod[STIFFEST] * (1 + q) * (1 + q))
+    # Where a filament is bent, its rolling bends it sideways: 4 q EI/ℓ over a segment's inertia, which is small.
+    sideways, twisted = rod[STIFFEST] + 4 * q * stiffness / rod[AXIAL], rod[STIFFEST_TWIST] * slope
+    damped = time * sideways + rod[STRETCHING_TIME] * twisted * slope
+    _resolve(step, sideways + twisted * (1 + 3 * p), damped)
     return float(work)
 
 
