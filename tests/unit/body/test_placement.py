@@ -48,7 +48,7 @@ def test_a_layer_of_many_takes_time_in_proportion(monkeypatch: pytest.MonkeyPatc
     particle, count = make_particle(), 256
     poses = place(particle, count=count, radius=0.2, obstacles=np.full((10_000, 3), -1.0))
     assert len(poses.positions) == count
-    # Each doubling sorts a sphere in once more; the obstacles are sorted once, and trees for all would have 65 times more.
+    # Each doubling sorts a sphere in once more, and obstacles are sorted once; trees of all would sort 65 times more.
     assert sum(sizes) <= 10_000 + 9 * count * len(particle.centres)
 
 
