@@ -26,7 +26,7 @@ from validation.bench import (
     watched,
 )
 from validation.cases import Check, above, below, hard, near, nothing, says
-from validation.extremes import crossings
+from validation.extremes import crossings, segments
 from validation.hard.runs import Noting, whole
 
 
@@ -279,15 +279,15 @@ def lid(access: EngineAccess, out: Path, *, count: int, stiffness: float) -> lis
     recorder.watchdog.energy = math.inf  # the ledger does not include the work of the added load
     top = int(engine.state().smarticles.positions[:, 2].argmax())
     access.burden(engine, top, ratio, rise=rise)
-    crossed, last, interval = 0, engine.state().smarticles.vertices, round(1e-3 / engine.time_step)
+    crossed, last, interval = 0, segments(engine.state().smarticles.vertices), round(1e-3 / engine.time_step)
 
     def watch(seconds: float) -> str | None:
         nonlocal crossed, last
         message, end = None, engine.time + seconds
         while not message and engine.time < end:
             engine.advance(interval)
-            vertices = engine.state().smarticles.vertices
-            crossed, last = crossed + len(crossings(last, vertices)), vertices
+            ends = segments(engine.state().smarticles.vertices)
+            crossed, last = crossed + len(crossings(last, ends)), ends
             message = watchdog_error(engine, recorder)
         return message
 

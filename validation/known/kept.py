@@ -18,7 +18,7 @@ from dem.plan.steps import time_step
 from validation.access import EngineAccess
 from validation.bench import Array, add, drive, law_of, scene, scene_data, shape_change
 from validation.cases import Answer, case
-from validation.extremes import crossings
+from validation.extremes import crossings, segments
 from validation.hard.runs import whole
 
 YADES_TURNS = {"yade": "its turns are of first order: ladder `spin`"}
@@ -187,7 +187,7 @@ def thrown_at(access: EngineAccess, *, stiffness: float, throws: int = 30) -> li
         for _ in range(math.ceil(0.06 / 10 / dt)):
             engine.advance(1)
             after = engine.state().smarticles.vertices
-            passed |= bool(crossings(before, after))
+            passed |= bool(crossings(segments(before), segments(after)))
             before = after
         crossed += passed
         met += abs(engine.state().smarticles.velocities[0, 0]) > 1e-3
