@@ -1,7 +1,17 @@
-"""Run the console command: `python -m smarticles`."""
+"""Run the console command: `smarticles`, or `python -m smarticles`."""
 
 import sys
 
-from smarticles.main import main
+from dem.run.stop import hold
 
-sys.exit(main())
+
+def main() -> int:
+    """Run `smarticles` with the arguments of this process; SIGUSR1 waits while modules are imported."""
+    hold()
+    from smarticles.main import main  # noqa: PLC0415  (takes a fifth of a second)
+
+    return main()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -14,6 +14,7 @@ from types import FrameType
 from typing import Any
 
 from dem.errors import InputError, RunError
+from dem.run.stop import release
 from dem.terminal import printable
 from smarticles.command_line import Commands, Parser, add_options
 from smarticles.commands import (
@@ -154,6 +155,8 @@ def _dispatch(words: list[str]) -> int:
     if unknown:
         commands.parsers[arguments.command].reject_unknown(unknown)
     arguments.command_line = shlex.join(["smarticles", *words])
+    if arguments.handler not in (run.run_scene, run.resume_directory):  # these listen for SIGUSR1
+        release()
     status: int = arguments.handler(arguments)
     return status
 

@@ -71,10 +71,10 @@ def folder_of(
 
 
 def expected_wall_s(scene: Scene) -> float:
-    """Return the expected wall time of a scene [s] on one core of the machine of the cost measurements."""
-    from dem.plan.outlook import planned_phases  # noqa: PLC0415
+    """Return the expected wall time of a run [s], with its start, on one core of the machine of the measurements."""
+    from dem.plan.outlook import START_S, planned_phases  # noqa: PLC0415
 
-    return sum(phase.wall_s for phase in planned_phases(scene))
+    return START_S + sum(phase.wall_s for phase in planned_phases(scene))
 
 
 # -- on this machine ---------------------------------------------------------------------------------------------------

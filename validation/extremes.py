@@ -123,7 +123,7 @@ INSIDE = 1e-3  # least distance of a crossing from the ends of a segment, over t
 
 
 def segments(vertices: Array) -> Array:
-    """Return the ends (3N, 2, 3) [m] of the axes of all links, from vertices (N, 4, 3) [m]."""
+    """Return the ends (3N, 2, 3) [m] of the axes of all links of smarticles, from vertices (N, 4, 3) [m]."""
     found: Array = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2).reshape(-1, 2, 3)
     return found
 
@@ -143,13 +143,14 @@ def surface(ends: Array, thickness: float) -> tuple[Array, Array]:
     return points, np.repeat([0.0, thickness / 2], [2 * len(ends), len(inner)])
 
 
-def crossings(one: Array, two: Array, body: NDArray[np.int64]) -> list[tuple[int, int]]:
+def crossings(one: Array, two: Array, body: NDArray[np.int64] | None = None) -> list[tuple[int, int]]:
     """Find links of different bodies whose axes passed through each other between two frames.
 
-    Ends of axes (M, 2, 3) [m] are assumed to move along straight lines; link m belongs to body[m]. When two axes pass
-    through each other, the volume of the tetrahedron of their four ends changes sign, and the common point lies within
-    both axes. The result has pairs of links.
+    Ends of axes (M, 2, 3) [m] are assumed to move along straight lines; link m belongs to body[m]; None: each three
+    links are a smarticle. When two axes pass through each other, the volume of the tetrahedron of their four ends
+    changes sign, and the common point lies within both axes. The result has pairs of links.
     """
+    body = np.arange(len(one)) // 3 if body is None else body
     # Links without length (l/w = 0) cannot cross.
     long = np.minimum(np.ptp(one, axis=1), np.ptp(two, axis=1)).max(axis=-1) > 0
     low = np.minimum(one, two).min(axis=1)

@@ -5,12 +5,10 @@ import pytest
 
 from dem.errors import InputError
 from dem.scene.reading import parse_scene
-from validation.extremes import accepted_depth, crossings, draw_scene, surface
+from validation.extremes import accepted_depth, crossings, draw_scene, segments, surface
 
-VERTICES = np.array([[-3.0, 0, 0], [-1, 0, 0], [1, 0, 0], [3, 0, 0]])
-ALONG_X = np.stack([VERTICES[:-1], VERTICES[1:]], axis=1)
+ALONG_X = segments(np.array([[[-3.0, 0, 0], [-1, 0, 0], [1, 0, 0], [3, 0, 0]]]))
 ALONG_Y = ALONG_X[..., [1, 0, 2]]
-BODY = np.repeat([0, 1], 3)
 
 
 @pytest.mark.parametrize(
@@ -26,12 +24,12 @@ def test_axes_that_pass_through_each_other_are_found(
     start: tuple[float, ...], end: tuple[float, ...], pairs: list[tuple[int, int]]
 ) -> None:
     before, after = (np.concatenate([ALONG_X, ALONG_Y + np.array(way)]) for way in (start, end))
-    assert crossings(before, after, BODY) == pairs
+    assert crossings(before, after) == pairs
 
 
 def test_a_link_without_length_crosses_nothing() -> None:
     above = np.tile([0.0, 0.0, 1.0], (3, 2, 1))
-    assert crossings(np.concatenate([ALONG_X, above]), np.concatenate([ALONG_X, -above]), BODY) == []
+    assert crossings(np.concatenate([ALONG_X, above]), np.concatenate([ALONG_X, -above])) == []
 
 
 def test_links_of_one_body_may_cross() -> None:

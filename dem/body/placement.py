@@ -62,12 +62,13 @@ def place_layer(
     spacing = 2 * thickest * (1 + CLEARANCE)
     margin = thickest * (1 + 2 * CLEARANCE)
     widest = radius - margin
-    occupied = obstacles
+    # Trees of spheres, each smaller than the one before it, so that a new body is not sorted in among all.
+    trees = [cKDTree(obstacles)] if len(obstacles) else []
     positions: list[Array] = []
     rotations: list[Rotation] = []
     increases = 0
     while len(positions) < count:
-        tree, particle = cKDTree(occupied) if len(occupied) else None, each[len(positions)]
+        particle = each[len(positions)]
         for _ in range(ATTEMPTS):
             rotation = Rotation.random(random_state=rng)
             spheres = rotation.apply(particle.centres)
@@ -82,11 +83,13 @@ def place_layer(
             # The radius at the tops of the spheres counts, so that they touch neither wall nor ceiling of a tier.
             if narrower is not None and (off_axis > narrower(spheres[:, 2] + margin) - margin).any():
                 continue
-            if tree is not None and tree.query(spheres, distance_upper_bound=spacing)[0].min() < spacing:
+            if any(tree.query(spheres, distance_upper_bound=spacing)[0].min() < spacing for tree in trees):
                 continue
             positions.append(centre)
             rotations.append(rotation)
-            occupied = np.concatenate([occupied, spheres])
+            while trees and trees[-1].n <= len(spheres):
+                spheres = np.concatenate([trees.pop().data, spheres])
+            trees.append(cKDTree(spheres))
             break
         else:
             height *= 1 + GROWTH

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dem.errors import InputError, RunError
-from dem.record.files import reject_inflated, whole
+from dem.errors import InputError
+from dem.record.files import cannot_write, reject_inflated, whole
 from dem.record.names import CHECKPOINT, CHECKPOINT_BEFORE, CHECKPOINT_FORMAT
 
 _ENGINE, _STATE, _SERIES = "engine.bin", "state.json", "series.npz"
@@ -55,10 +55,7 @@ def write_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             file.flush()
             os.fsync(file.fileno())
     except OSError as error:
-        raise RunError(
-            f"{newest}: cannot be written ({error.strerror or error}); free space and go on with "
-            "`smarticles run … --resume`; the checkpoint before is whole"
-        ) from error
+        cannot_write(newest, error, "and go on with `smarticles run … --resume`; the checkpoint before is whole")
 
 
 def read_checkpoint(folder: Path, *, scene_sha256: str, made_by: tuple[str, str]) -> tuple[Checkpoint, str | None]:

@@ -10,6 +10,9 @@ from typing import NoReturn
 from dem.errors import InputError, RunError
 from dem.record.names import partial
 
+GONE = "is gone; put it back and continue with `smarticles resume`, or start the run anew"
+_CHOOSE = "or choose another --out; everything written before is whole"
+
 
 @contextlib.contextmanager
 def whole(path: Path, *, before: Path | None = None, shared: bool = False) -> Iterator[Path]:
@@ -43,16 +46,21 @@ def write_whole(path: Path, write: Callable[[Path], object], *, make_folder: boo
             path.parent.mkdir(exist_ok=True)
         with whole(path) as temporary:
             write(temporary)
-    except FileNotFoundError as error:
+    except OSError as error:
+        cannot_write(path, error)
+
+
+def cannot_write(path: Path, error: Exception, remedy: str = _CHOOSE) -> NoReturn:
+    """Raise RunError about a file of a run that cannot be written; `remedy` follows "free space"."""
+    if isinstance(error, FileNotFoundError) and path.parent.is_dir():
+        raise RunError(f"{path}: {GONE}") from error
+    if isinstance(error, FileNotFoundError):
         raise RunError(
             f"{path}: cannot be written, its folder is gone; if it was moved, what is written in it is whole, and a "
             "run goes on from there: smarticles resume DIR"
         ) from error
-    except OSError as error:
-        raise RunError(
-            f"{path}: cannot be written ({error.strerror or error}); free space or choose another --out; "
-            "everything written before is whole"
-        ) from error
+    cause = getattr(error, "strerror", None) or error
+    raise RunError(f"{path}: cannot be written ({cause}); free space {remedy}") from error
 
 
 def write_text(path: Path, text: str, *, make_folder: bool = True) -> None:

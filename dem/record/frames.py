@@ -17,12 +17,11 @@ import numpy as np
 from dem.arrays import Array
 from dem.errors import InputError, RunError, shown
 from dem.record import names
-from dem.record.files import cannot_read, write_text, write_whole
+from dem.record.files import GONE, cannot_read, write_text, write_whole
 from dem.record.frame import Frame, read_frame
 from dem.record.vtkhdf import RADIUS, append, create, read_times, truncate
 
 _REMEDY = "give the directory of a run that has written a frame"
-_GONE = "is gone; put it back and continue with `smarticles resume`, or start the run anew"
 
 
 @dataclass
@@ -47,7 +46,7 @@ class FrameWriter:
         for number in range(len(self.times)):
             path = self.folder / names.member(self.noun, number)
             if path.name not in present:
-                raise RunError(f"{path}: {_GONE}")
+                raise RunError(f"{path}: {GONE}")
 
     def truncate(self, times: Sequence[float]) -> None:
         """Keep the first frames, whose times [s] are given, and remove all later ones."""
@@ -88,7 +87,7 @@ class OneFileWriter(FrameWriter):
         """Raise RunError if the file is missing although frames were written."""
         path = self.folder / names.VTKHDF
         if self.times and not path.is_file():
-            raise RunError(f"{path}: {_GONE}")
+            raise RunError(f"{path}: {GONE}")
 
     def truncate(self, times: Sequence[float]) -> None:
         """Keep the first frames, whose times [s] are given, and remove all later ones."""

@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dem.arrays import Array
-from dem.errors import RunError
-from dem.record.files import cannot_read, write_whole
+from dem.record.files import cannot_read, cannot_write, write_whole
 from dem.record.journal import Journaled, journal_of, roll_back
 from dem.record.names import SCENE
 
@@ -200,10 +199,7 @@ def _change(path: Path, change: Callable[[Any], None]) -> None:
                 change(file["VTKHDF"])
             stored.commit()
     except (OSError, KeyError, RuntimeError) as error:  # HDF5 raises the latter on a file that was damaged meanwhile
-        raise RunError(
-            f"{path}: cannot be written ({getattr(error, 'strerror', None) or error}); free space or choose another "
-            "--out; everything written before is whole"
-        ) from error
+        cannot_write(path, error)
 
 
 def _read(path: Path, what: str, take: Callable[[Any], T]) -> T:

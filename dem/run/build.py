@@ -31,7 +31,9 @@ from dem.scene.scene import Scene
 GAP_LIMIT = 0.2  # gap of a hinge in sphere diameters; it is up to 0.01 in a pile and 0.02 at an impact of 3 m/s
 # The same at a joint of chains, whose pins give way about as much as contacts; links could pass through wider gaps.
 PIN_LIMIT = 0.5
-SPEED_MARGIN = 5.0  # limit of speeds, over the speed of a fall over the container's height, of the shaking or of motors
+# Limit of speeds, over the speed of a fall over the container's height, of the shaking or of motors. In mixtures with
+# masses in a ratio of more than its square, the lightest body with all the kinetic energy of a heaviest one is faster.
+SPEED_MARGIN = 5.0
 # Overlap in sphere diameters, from which on the forces of wall and floor decrease or point outwards, and chains slip
 # through each other. Shaking at Γ = 10 with the fidelity draft reaches 0.4.
 DEPTH_LIMIT = 0.5
@@ -125,10 +127,10 @@ def build_watchdog(scene: Scene) -> Watchdog:
     gravity, diameter = scene.gravity_m_per_s2, scene.sphere_diameter
     fall = math.sqrt(2 * gravity * (scene.cylinder.height + sum(phase.raises for phase in scene.phases)))
     fastest = max(speed_by_motors(scene), *(phase.peak_speed(gravity) for phase in scene.phases))
-    mass = scene.count * scene.model.mass
+    mass, masses = scene.count * scene.model.mass, [body.mass for body in scene.bodies]
     return Watchdog(
         cylinder=scene.cylinder,
-        speed=SPEED_MARGIN * max(fall, fastest),
+        speed=max(SPEED_MARGIN, math.sqrt(max(masses) / min(masses))) * max(fall, fastest),
         way_out=DAMP_SHAFTS if _rings(scene) else LOWER_STEP,
         gap=(PIN_LIMIT if scene.mixture is not None and scene.mixture.jointed else GAP_LIMIT) * diameter,
         depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,

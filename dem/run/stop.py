@@ -11,6 +11,16 @@ class StopRequestedError(Exception):
     """A run stopped after SIGUSR1, at a checkpoint or before it began, and can be continued."""
 
 
+def hold() -> None:
+    """Let SIGUSR1 wait until `release`, or until a `StopRequest` listens; for a process that still imports modules."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR1})
+
+
+def release() -> None:
+    """End the wait of SIGUSR1 that `hold` began; without a listener it ends the process."""
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGUSR1})
+
+
 class StopRequest:
     """A request to stop: `came` is true once SIGUSR1 has come while `listening` was active."""
 
@@ -26,6 +36,7 @@ class StopRequest:
             yield
             return
         before = signal.signal(signal.SIGUSR1, self._note)
+        release()
         try:
             yield
         finally:

@@ -74,7 +74,7 @@ class ColourScale:
             top = max(1, min(int(high), _MOST_COUNTS))
             labels = {float(count): str(count) for count in range(top + 1)}
             if int(high) > top:
-                labels[float(top)] = f"≥ {top}"
+                labels[float(top)] = f"{top}+"
             colours = ListedColormap(["#c9c9c9", *figures.sequence(top)])
             return cls(kind="count", colours=colours, low=-0.5, high=top + 0.5, labels=labels)
         if not high > low:  # all values are equal

@@ -202,6 +202,8 @@ def pictures(
         subject.bodies.hold(subject.frames[i] for i in shown)
     values = [dict(zip(shown, subject.values(shown, style), strict=True)) for subject, shown in pairs]
     scale = ColourScale.of(style.field, _span(subjects, values, style, limits))
+    if not any(np.isfinite(each).any() for of_run in values for each in of_run.values()):
+        scale = replace(scale, labels={(scale.low + scale.high) / 2: "no values here: grey"})
     force = None
     if "forces" in subjects[0].bodies.kinds:
         each = (read_forces(subject.frames[i]).contacts.normal for subject, shown in pairs for i in shown)

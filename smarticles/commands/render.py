@@ -70,7 +70,7 @@ display is needed. The suffix of the output chooses between a picture (.png) and
         render,
         "--color-by",
         help="crossings (default; number of links of others through the smarticle's plane), contacts, height, speed, "
-        "id (default for motion in a plane)",
+        "id (default for motion in a plane), or another field of `smarticles export`, such as local_packing_fraction",
     )
     render.add_argument(
         "--clim",

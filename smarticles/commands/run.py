@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from dem.errors import InputError
 from dem.record.names import MANIFEST, SCENE
-from dem.run.stop import StopRequest, StopRequestedError
+from dem.run.stop import StopRequest, StopRequestedError, release
 from dem.terminal import warn
 from smarticles import sweeps
 from smarticles.command_line import Commands, add_options, scene_settings
@@ -105,6 +105,7 @@ def resume_directory(arguments: argparse.Namespace) -> int:
             msg = f"{directory}: is a single run; give the directory of its sweep to submit it, or leave --submit out"
             raise InputError(msg)
         return _run(directory / SCENE, directory, arguments, resume=True)
+    release()  # a sweep does not listen for SIGUSR1
     folder = open_folder(directory)
     if arguments.threads is not None:
         option = f"--threads {arguments.threads}"

@@ -93,6 +93,8 @@ def test_the_figure_shows_fully_shaken_piles_alone() -> None:
     assert values["after rest"].loc[0.7].tolist() == [0.1155, 0.143]
     assert values["while shaken"].loc[0.7].isna().tolist() == [True, False]
     assert values["after rest"].loc[0.4].isna().tolist() == [False, True]  # shaken for 1.5 s beside 20 s
+    found = STUDY.extra(runs)["deviations"].set_index(ASPECT)["stage"]
+    assert (found.loc[[0.4]].tolist(), set(found.loc[0.7])) == (["phi_0"], {"phi_0", "phi_f", AT_REST})
 
 
 def test_figures_of_a_quick_study_say_what_the_full_study_found(tmp_path: Path) -> None:

@@ -280,7 +280,6 @@ def lid(access: EngineAccess, out: Path, *, count: int, stiffness: float) -> lis
     top = int(engine.state().smarticles.positions[:, 2].argmax())
     access.burden(engine, top, ratio, rise=rise)
     crossed, last, interval = 0, segments(engine.state().smarticles.vertices), round(1e-3 / engine.time_step)
-    body = np.repeat(np.arange(count), 3)
 
     def watch(seconds: float) -> str | None:
         nonlocal crossed, last
@@ -288,7 +287,7 @@ def lid(access: EngineAccess, out: Path, *, count: int, stiffness: float) -> lis
         while not message and engine.time < end:
             engine.advance(interval)
             ends = segments(engine.state().smarticles.vertices)
-            crossed, last = crossed + len(crossings(last, ends, body)), ends
+            crossed, last = crossed + len(crossings(last, ends)), ends
             message = watchdog_error(engine, recorder)
         return message
 

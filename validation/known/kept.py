@@ -183,11 +183,11 @@ def thrown_at(access: EngineAccess, *, stiffness: float, throws: int = 30) -> li
         add(engine, (0.03, across, 0.1 + up), Rotation.random(random_state=rng))
         axis = rng.normal(size=3)
         access.push(engine, 1, velocity=(-10, 0, 0), spin=60 * axis / np.linalg.norm(axis))
-        before, passed = segments(engine.state().smarticles.vertices), False
+        before, passed = engine.state().smarticles.vertices, False
         for _ in range(math.ceil(0.06 / 10 / dt)):
             engine.advance(1)
-            after = segments(engine.state().smarticles.vertices)
-            passed |= bool(crossings(before, after, np.repeat([0, 1], 3)))
+            after = engine.state().smarticles.vertices
+            passed |= bool(crossings(segments(before), segments(after)))
             before = after
         crossed += passed
         met += abs(engine.state().smarticles.velocities[0, 0]) > 1e-3

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scenes import make_particle
+from scipy.spatial import cKDTree
 from scipy.stats import chi2, kstest
 
 from dem.body.particle import Particle
@@ -34,6 +35,21 @@ def test_no_two_smarticles_overlap_nor_the_wall(ratio: float, count: int) -> Non
     assert distances[~np.eye(count, dtype=bool)].min() > particle.chain.diameter
     assert np.hypot(placed[..., 0], placed[..., 1]).max() + particle.radius < RADIUS
     assert placed[..., 2].min() - particle.radius >= BOTTOM * (1 - 1e-9)
+
+
+def test_a_layer_of_many_takes_time_in_proportion(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes: list[int] = []
+
+    def counted(points: np.ndarray) -> cKDTree:
+        sizes.append(len(points))
+        return cKDTree(points)
+
+    monkeypatch.setattr("dem.body.placement.cKDTree", counted)
+    particle, count = make_particle(), 256
+    poses = place(particle, count=count, radius=0.2, obstacles=np.full((10_000, 3), -1.0))
+    assert len(poses.positions) == count
+    # Each doubling sorts a sphere in once more, and obstacles are sorted once; trees of all would sort 65 times more.
+    assert sum(sizes) <= 10_000 + 9 * count * len(particle.centres)
 
 
 def test_layers_keep_off_obstacles() -> None:

@@ -1,7 +1,7 @@
 """A plan: which effects a scene calls for, warnings, costs on the links engine."""
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import pytest
@@ -71,6 +71,13 @@ def test_each_effect_is_called_for_by_its_own_part_of_the_scene(changes: dict[st
     assert set(plain.engines) <= set(added.engines)
     assert set(planned.engines) == set(added.engines)
     assert json.loads(json.dumps(asdict(planned)))["effects"][0]["adds"]["engines"] == list(plain.engines)
+
+
+def test_the_total_counts_the_start_of_a_run() -> None:
+    planned = replace(plan(small(PLAIN)), wall_s=0.0, compile_s=0.0)
+    lines = [line.split() for line in planned.to_text().splitlines()]
+    assert ["starting", "2.5", "s"] in lines
+    assert next(line for line in lines if line[:1] == ["total"])[-2:] == ["2.5", "s"]
 
 
 def test_knobs_are_compared_with_those_of_the_name_in_this_scene() -> None:

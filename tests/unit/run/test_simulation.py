@@ -232,11 +232,15 @@ def replaced(out: Path) -> None:
 
 LOSSES: dict[str, tuple[Callable[[Path], object], str]] = {
     "directory deleted": (shutil.rmtree, "was deleted, moved or replaced|its folder is gone"),
+    **dict.fromkeys(
+        ("directory moved", "directory moved with one file"),
+        (lambda out: out.rename(out.with_name("moved")), "if it was moved, .*: smarticles resume DIR"),
+    ),
     "directory replaced": (replaced, "was deleted, moved or replaced"),
     "lock": (lambda out: (out / ".lock").unlink(), "was deleted, moved or replaced"),
     "manifest": (lambda out: (out / "run.json").unlink(), r"run\.json: is gone, and without it the run cannot be read"),
     "frames": (lambda out: shutil.rmtree(out / "frames"), r"frame_000000\.vtu: is gone; put it back"),
-    "one file": (lambda out: (out / "frames.vtkhdf").unlink(), r"frames\.vtkhdf: (is gone; put it|cannot be written)"),
+    "one file": (lambda out: (out / "frames.vtkhdf").unlink(), r"frames\.vtkhdf: is gone; put it back"),
     "one frame": (lambda out: (out / "frames/frame_000001.vtu").unlink(), r"frame_000001\.vtu: is gone; put it back"),
 }
 
@@ -246,7 +250,7 @@ LOSSES: dict[str, tuple[Callable[[Path], object], str]] = {
 def test_a_run_that_loses_its_files_fails_and_leaves_others_alone(
     kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, step: int
 ) -> None:
-    more = ONE_FILE if name == "one file" else {}
+    more = ONE_FILE if name.endswith("one file") else {}
     scene, out, advance = scene_of("rested", **more), tmp_path / "run", EngineDouble._step
     last = (run(scene, tmp_path / "whole") or Done(time_s=0, steps=0, wall_s=0, phases=())).steps
     lose, stated = LOSSES[name]

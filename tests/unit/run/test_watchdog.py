@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import make_boxes
+from scenes import make_boxes, small
 
 from dem.body.state import State
 from dem.errors import RunError
 from dem.physics.overlaps import Extremes, Held, Overlaps
+from dem.run.build import SPEED_MARGIN, build_watchdog
 from dem.run.watchdog import Watchdog
 from dem.setting.container import Cylinder
 
@@ -84,6 +85,14 @@ def test_broken_hinge_is_named_with_its_gap() -> None:
         gaps[2, 1] = bad
         with pytest.raises(RunError, match=r"1\.2500 s: 1 smarticle\(s\) \(2\): links more than 0\.0002 m apart"):
             dog.check(healthy(), floor=0.0, time=1.25, gaps=gaps)
+
+
+@pytest.mark.parametrize(("density", "margin"), [(1000, SPEED_MARGIN), (20000, math.sqrt(200))])
+def test_a_body_that_heavy_ones_hit_may_be_faster(density: float, margin: float) -> None:
+    rods = [{"shape": "rod", "length_m": 0.01, "diameter_m": 1e-3, "count": 2, "density_kg_per_m3": each}
+            for each in (100, density)]  # fmt: skip
+    scene = small({"engine": "links", "count": 4, "particle": rods})
+    assert build_watchdog(scene).speed == pytest.approx(margin * math.sqrt(2 * 9.81 * scene.cylinder.height))
 
 
 def test_a_run_warns_of_contacts_deeper_than_half_a_link_at_its_end() -> None:

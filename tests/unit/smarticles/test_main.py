@@ -161,6 +161,27 @@ def command(*words: str) -> list[str]:
     return [sys.executable, "-m", "smarticles", *words]
 
 
+SIGNALLED = """
+import os, runpy, signal, sys
+
+class Finder:
+    def find_spec(self, name, path, target=None):
+        if name == "smarticles.main":
+            os.kill(os.getpid(), signal.SIGUSR1)
+
+sys.meta_path.insert(0, Finder())
+runpy.run_module("smarticles", run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize(("name", "status"), [("run", 2), ("resume", 2), ("plan", -signal.SIGUSR1)])
+def test_sigusr1_during_imports_ends_no_run(name: str, status: int, tmp_path: Path) -> None:
+    (tmp_path / "run.json").write_text("{}")  # makes it a run directory, without a scene
+    words = [str(tmp_path), *(["--out", "out"] if name == "run" else [])]
+    ended = subprocess.run([sys.executable, "-c", SIGNALLED, name, *words], capture_output=True, text=True, check=False)
+    assert (ended.returncode, str(tmp_path) in ended.stderr) == (status, status == 2)
+
+
 def test_a_closed_pipe_is_no_error() -> None:
     process = subprocess.Popen(command("schema"), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None

@@ -16,6 +16,7 @@ from dem.record.names import FORCE
 from postprocess.bodies.colours import ColourScale
 from postprocess.bodies.fields import BY_NAME
 from postprocess.geometry.links import centres_of_mass
+from postprocess.pictures.canvas import Canvas
 from postprocess.pictures.render import render_run
 
 SIZE = (240, 240)
@@ -48,6 +49,15 @@ def panel(image):
 def coloured(image):
     """Which pixels are clearly neither white nor grey: container, floor and shadows are."""
     return np.ptp(image, axis=2) > 40
+
+
+def test_a_field_without_values_is_said_to_have_none(tmp_path, monkeypatch):
+    scales = Mock(side_effect=Canvas)
+    monkeypatch.setattr("postprocess.pictures.render.Canvas", scales)
+    one = single_run(tmp_path / "one", u_shape(0.7 * W)[None])  # alone its Voronoi cell is not closed
+    for field, words in (("local_packing_fraction", ["no values here: grey"]), ("contacts", ["0", "1"])):
+        render_run(one, output=tmp_path / f"{field}.png", size=SIZE, color_by=field)
+        assert list(scales.call_args.kwargs["scale"].labels.values()) == words
 
 
 def test_colours_reach_the_right_smarticle(tmp_path):
