@@ -92,10 +92,10 @@ def test_our_test_decides_where_theirs_is_not_resolved(
 ) -> None:
     strongest = "shape-change-strongest"
     theirs = {(study, strongest): by_theirs for study in ("fracture", "fracture-code")}
-    ours = {(study, strongest): by_ours for study in ("strength", "strength-code")}
+    ours = {(study, strongest): by_ours for study in ("strength-main", "strength-main-rigid")}
     claim = one_of(claims(written(tmp_path, theirs | ours)), "shape change has the highest peak force")
     assert claim.verdict == verdict
-    assert "; by a test of ours, strength-code: " in text((claim,))
+    assert "; by a test of ours, strength-main-rigid: " in text((claim,))
 
 
 def test_a_finding_that_is_not_there_is_named(tmp_path: Path) -> None:
