@@ -24,8 +24,8 @@ under none, and the opposite was found under one at least. *Not resolved*: neith
 take. *No data*: the runs are still to be made. *On YADE*: the finding on the other engine, where it has runs of its
 own: no part of the verdict, but it shows where engines differ. *By a test of ours*: in the paper's own test of strength
 single smarticles that bridge its hooks hold fast; where it does not resolve a claim, the test that tears the pile
-decides the verdict ([strength-main](strength-main/), [strength-main-rigid](strength-main-rigid/); over θ [strength](strength/),
-[strength-code](strength-code/)).
+decides the verdict ([strength-main](strength-main/), [strength-main-rigid](strength-main-rigid/); over θ
+[strength](strength/), [strength-code](strength-code/)).
 """
 _HEADER = ("", "claim", "verdict", "by the text", "by the code", "text on YADE", "code on YADE", "rests on", "why")
 

@@ -209,13 +209,16 @@ class Means:
                         axes, x, least, 0.05 * least.abs() + 0.2, properties={**properties, "markerfacecolor": "white"}
                     )
         self._label(axes, quantity)
-        axes.set_xscale("log" if self.log_x else "linear")
-        if len(places := self.transform(table[self.x]).dropna().unique()) == 1:
-            axes.set_xticks(places)  # series are shifted from it, and ticks between would look like values
+        self._scale(axes, self.transform(table[self.x]).dropna().unique())
         if self.log and positive:
             axes.set_yscale("log")
         elif positive:
             axes.set_ylim(bottom=0)
+
+    def _scale(self, axes: Axes, places: ArrayLike) -> None:
+        axes.set_xscale("log" if self.log_x else "linear")
+        if np.size(places) == 1:
+            axes.set_xticks(np.atleast_1d(places))  # series are shifted from it, and ticks between would look like values
 
     def _label(self, axes: Axes, quantity: Quantity) -> None:
         place = axes.get_subplotspec()
