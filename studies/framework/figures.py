@@ -218,7 +218,8 @@ class Means:
     def _scale(self, axes: Axes, places: ArrayLike) -> None:
         axes.set_xscale("log" if self.log_x else "linear")
         if np.size(places) == 1:
-            axes.set_xticks(np.atleast_1d(places))  # series are shifted from it, and ticks between would look like values
+            # Series are shifted from it, and ticks between would look like values.
+            axes.set_xticks(np.atleast_1d(places))
 
     def _label(self, axes: Axes, quantity: Quantity) -> None:
         place = axes.get_subplotspec()
