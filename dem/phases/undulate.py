@@ -52,7 +52,7 @@ class Undulate(Part, TimedPhase):
     )
     wavelength_lengths: float | None = Field(
         None,
-        gt=0,
+        ge=1e-3,
         le=1e6,
         description="wavelength over the length of the chain [1]; the wave travels from the first link to the last "
         "one; default: all motors swing together",

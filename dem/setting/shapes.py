@@ -284,7 +284,7 @@ class Free(Shaped):
         # Before the bars are laid out, which needs points that exist.
         try:
             points, pairs = [tuple(map(float, p)) for p in data["points_m"]], [(a, b) for a, b in data["pairs"]]
-        except (KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError, OverflowError):
             return data  # validation of the fields reports what is wrong
         for k, pair in enumerate(pairs):
             for end in pair:

@@ -109,6 +109,8 @@ def test_a_plan_has_their_step_and_effects() -> None:
      "particle.joints: unknown key 'yield_N_m'; it belongs in law: elastic"),
     ({"particle.joints": {"law": "free", "stiffness_N_m_per_rad": 1}},
      "particle.joints: unknown key 'stiffness_N_m_per_rad'; it belongs in law: elastic or motor"),
+    ({"phases.1.wavelength_lengths": 1e-318},
+     "phases.1.wavelength_lengths: 1e-318 is out of range; use at least 0.001"),
     ({"particle.joints": {**MOTOR, "speed": 1}}, "particle.joints: unknown key 'speed'; did you mean"),
     ({"particle.joints": "motor"}, "particle.joints.0: 'motor' is not keys and values; write them as {law: …}"),
     ({"particle": [5]}, "particle.0: 5 is not keys and values; write them as {shape: …}"),

@@ -185,6 +185,10 @@ BAD = {
     "millimetres": ({"shape": "rod", "length_m": 10}, ["length_m", "write 0.01"]),
     "no such point": ({"shape": "segments", **TREE, "pairs": [[0, 7]]}, ["pairs.0", "use 0 to 4"]),
     "in two pieces": ({"shape": "segments", **TREE, "pairs": [[0, 1], [2, 3]]}, ["pairs", "one piece"]),
+    "a point too far for a float": (
+        {"shape": "segments", **TREE, "points_m": [[0, 0, 10**400], *TREE["points_m"][1:]]},
+        ["points_m.0.2", "is not a number"],
+    ),
     "a bar of no length": ({"shape": "segments", **TREE, "pairs": [[1, 1]]}, ["pairs.0", "different points"]),
     "normal along a bar": ({"shape": "segments", **TREE, "normal": [1, 0, 0]}, ["normals", "across"]),
     "two sections": (
