@@ -56,7 +56,7 @@ def export_run(
             `export.TO` (file) in the run directory, where TO is the format.
         time: Simulated time [s]; the frame nearest to it is exported. None: the last frame.
         every_frame: Whether to export all frames; `time` must then be None.
-        wanted: Kinds of bodies besides `postprocess.bodies.meshes.USUAL`.
+        wanted: Kinds of bodies besides `postprocess.bodies.meshes.USUAL`, and fields on request.
         unwanted: Kinds of bodies and fields to leave out.
         color_by: Name or short name of the field that colours the smarticles, for formats with colours; None: the usual
             field, see `colour_field`.
@@ -74,6 +74,7 @@ def export_run(
     run = open_run(directory)
     fields = fields_of(run)
     kinds = checked_kinds(wanted, unwanted, also=[field.name for field in fields])
+    fields = tuple(field for field in fields if not field.on_request or field.name in wanted)
     frames = read_frames(directory)
     chosen = range(len(frames)) if every_frame else [len(frames) - 1 if time is None else frames.nearest(time)]
     folder = to == "vtp" or (every_frame and to != "gsd")

@@ -79,7 +79,9 @@ class RunView:
         self.index = len(self.frames) - 1
         self.frame = self.frames[-1]
         self.fields = tuple(
-            field for field in fields_of(self.run) if field.costly or field.take(self.frame, self.run) is not None
+            field
+            for field in fields_of(self.run)
+            if not field.on_request and (field.costly or field.take(self.frame, self.run) is not None)
         )
         self.field = colour_field(None, self.run)
         self.pick: Pick | None = None

@@ -14,9 +14,11 @@ from dem.record.frame import Frame
 from dem.record.run import Run
 from postprocess.geometry.bars import body_centres
 from postprocess.geometry.links import Floats, UndefinedMeasureError, link_lengths
+from postprocess.geometry.segments import segments_of
 from postprocess.geometry.voronoi import local_packing
 from postprocess.geometry.voxel import Region
 from postprocess.measures.clusters import Clusters, contact_graph, entanglement_clusters
+from postprocess.measures.crossing_number import average_crossing_numbers
 from postprocess.measures.entanglement import frame_crossings
 from postprocess.measures.force_chains import force_chains
 from postprocess.measures.registry import any_in_space, in_one_cylinder, in_space
@@ -47,6 +49,7 @@ class Field:
     of: Literal["smarticle", "link"] = "smarticle"  #: Whether each smarticle or each link has a value
     available_for: Callable[[Run], bool] = lambda _: True  #: Returns whether a run has the field
     costly: bool = False  #: Whether the field takes tenths of a second per frame or more
+    on_request: bool = False  #: Whether only exports and pictures that name the field have it
     label: str = ""  #: Text of the colour bar; the name if empty
     shown: tuple[float, str] | None = None  #: Factor from SI and unit of the numbers at the colour bar; None: SI
 
@@ -177,6 +180,16 @@ FIELDS: tuple[Field, ...] = (
         kind="count",
         label="links of others through its plane",
         available_for=any_in_space,
+    ),
+    Field(
+        "average_crossing_number",
+        "-",
+        "average crossing number with all others; their mean is ⟨ACN⟩; on request: costs 0.3 µs per pair of links",
+        lambda frame, _: average_crossing_numbers(*segments_of(frame)).per_body,
+        label="average crossing number with all others",
+        available_for=any_in_space,
+        costly=True,
+        on_request=True,
     ),
     Field(
         "contact_cluster",

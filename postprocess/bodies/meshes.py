@@ -214,12 +214,11 @@ _FACES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2
 def checked_kinds(wanted: Sequence[str], unwanted: Sequence[str], *, also: Sequence[str] = ()) -> tuple[str, ...]:
     """Return the kinds of bodies to export: `USUAL` and the wanted kinds, without the unwanted kinds.
 
-    `unwanted` may also contain the names in `also`. InputError if a kind is unknown, or none is left.
+    Both may also contain the names in `also`. InputError if a kind is unknown, or none is left.
     """
-    for name in (*wanted, *(name for name in unwanted if name not in also)):
-        if name not in KINDS:
-            known = [*KINDS, *(also if name in unwanted else ())]
-            raise InputError(f"{name!r} is nothing to export; {nearest(name, known, cutoff=0.5)}")
+    for name in (*wanted, *unwanted):
+        if name not in KINDS and name not in also:
+            raise InputError(f"{name!r} is nothing to export; {nearest(name, [*KINDS, *also], cutoff=0.5)}")
     kept = tuple(kind for kind in KINDS if kind in (*USUAL, *wanted) and kind not in unwanted)
     if not kept:
         raise InputError("nothing to export: all kinds of bodies are left out; leave out less")

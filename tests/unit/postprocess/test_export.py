@@ -156,11 +156,17 @@ def test_vtp_lists_every_frame_with_its_time_and_all_fields(pile, tmp_path):
     mesh = pv.read(folder / listed[-1]["file"])
     assert mesh.n_cells == 12 * 3 * 6
     asked_for = {"angle_rad", "motor_torque_N_m", "motor_work_J", "halted", "normal_force_N", "force_chain", "kind"}
-    rigid = {field.name for field in FIELDS} - asked_for
+    rigid = {field.name for field in FIELDS if not field.on_request} - asked_for
     assert set(mesh.cell_data.keys()) == rigid
     assert mesh.field_data["TimeValue"] == pytest.approx([frames.times[-1]])
     assert {path.stem for path in folder.glob("*.pvd")} == {"smarticles", "wall", "floor", "crossings"}
     assert (folder / "show_in_paraview.py").is_file()
+
+
+def test_a_field_on_request_is_exported_if_it_is_named(pile, tmp_path):
+    folder = export_run(pile, to="vtp", output=tmp_path / "out", wanted=["average_crossing_number"])
+    (file,) = folder.glob("smarticles/*.vtp")
+    assert (pv.read(file).cell_data["average_crossing_number"] > 0).all()
 
 
 def test_a_kind_that_comes_or_goes_is_nothing_at_the_other_times(opened, tmp_path):

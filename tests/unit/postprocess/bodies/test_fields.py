@@ -10,7 +10,9 @@ from dem.record.frames import FrameWriter, read_frames
 from dem.record.run import open_run
 from postprocess.bodies.colours import ColourScale, colour_field, linear
 from postprocess.bodies.fields import BY_NAME, fields_of, link_values
+from postprocess.geometry.segments import segments_of
 from postprocess.measures.clusters import entanglement_clusters
+from postprocess.measures.crossing_number import average_crossing_numbers
 from postprocess.measures.entanglement import link_crossings
 
 
@@ -33,6 +35,13 @@ def test_values_are_those_of_the_measures(pile):
     _, height = values(pile, "height_m")
     assert np.sort(height[:, 0])[-1] == pytest.approx(SyntheticRun(count=60).height(0.132), rel=0.01)
     assert values(pile, "contacts")[1][:, 0].tolist() == frame.contacts.tolist()
+
+
+def test_average_crossing_numbers_of_bodies_have_the_mean_of_the_measure(pile):
+    frame, found = values(pile, "average_crossing_number")
+    pairs = average_crossing_numbers(*segments_of(frame))
+    assert found[:, 0].mean() == pytest.approx(pairs.mean)
+    assert found[:, 1] == pytest.approx(pairs.matrix.sum(axis=0))
 
 
 def test_cells_of_local_packing_fill_the_container(pile):
