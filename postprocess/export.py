@@ -12,7 +12,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pyvista as pv
 import trimesh
-from vtkmodules.vtkCommonCore import vtkStringArray
+from vtkmodules.vtkCommonCore import vtkPoints, vtkStringArray
 
 from dem.errors import InputError, RunError, nearest
 from dem.record.frame import Frame
@@ -153,8 +153,9 @@ def _write_collection(folder: Path, bodies: Bodies, frames: Iterable[tuple[int, 
         for kind, mesh in found.items():
             if kind not in empty:
                 (folder / kind).mkdir()
-                # ParaView's filters need the fields at all times.
+                # ParaView's filters need the fields at all times, and its reader reports files that lack points.
                 empty[kind] = pv.PolyData()
+                empty[kind].SetPoints(vtkPoints())
                 empty[kind].GetPointData().CopyStructure(mesh.GetPointData())
                 empty[kind].GetCellData().CopyStructure(mesh.GetCellData())
                 for before in written:

@@ -1,4 +1,4 @@
-"""Show an exported run in ParaView: smarticles coloured by crossings, and the wall cut open.
+"""Show an exported run in ParaView: bodies coloured by crossings, kinds or contacts, and the wall cut open.
 
     paraview --script=show_in_paraview.py                     in ParaView's window; then press play
     pvpython show_in_paraview.py FOLDER --picture last.png    a picture of the last frame, without a window
@@ -32,6 +32,7 @@ COLOURS = {
     "forces": "#a11a2e",
 }
 SIZE = [1000, 800]  # of pictures [pixel]
+NUMBER = "smarticle_id"  #: Field that colours planar runs
 KINDS = ("smarticles", "wall", "floor", "hooks", "strings", "crossings", "forces")
 
 
@@ -120,7 +121,7 @@ def largest_at(source: Any, time: float, name: str) -> float:
 
 
 def boxes(_kind: str, source: Any, view: Any) -> None:
-    """Colour smarticles by crossings, or by number if the run is planar, on one scale for all times."""
+    """Colour bodies by `colouring` on one scale for all times."""
     shown = simple.Show(source, view)
     name = colouring(source)
     simple.ColorBy(shown, ("CELLS", name))
@@ -138,13 +139,19 @@ def boxes(_kind: str, source: Any, view: Any) -> None:
     bar.UseCustomLabels, bar.AddRangeLabels = 1, 0
     bar.AutomaticLabelFormat, bar.LabelFormat = 0, "%.0f"
     bar.CustomLabels = [float(value) for value in range(low, high + 1, max(1, (high - low) // 12))]
-    shown.SetScalarBarVisibility(view, name == "crossings")
+    shown.SetScalarBarVisibility(view, name != NUMBER)
 
 
 def colouring(source: Any) -> str:
-    """Return the name of the field by which smarticles are coloured."""
+    """Return the name of the field that colours bodies: as in pictures of `smarticles render`."""
     source.UpdatePipeline()
-    return "crossings" if source.CellData.GetArray("crossings") is not None else "smarticle_id"
+    fields = source.CellData
+    if fields.GetArray("crossings") is None:  # the run is planar
+        return NUMBER
+    kind = fields.GetArray("kind")
+    if kind is None:
+        return "crossings"
+    return "kind" if kind.GetRange()[1] > 0 else "contacts"
 
 
 def wall(kind: str, source: Any, view: Any) -> None:
@@ -209,7 +216,7 @@ def aim(view: Any, source: Any) -> None:
     """Point the camera at the smarticles from the front, slightly from above; at a planar run from above."""
     low_x, high_x, low_y, high_y, low_z, high_z = source.GetDataInformation().GetBounds()
     focus = [(low_x + high_x) / 2, (low_y + high_y) / 2, (low_z + high_z) / 2]
-    flat = colouring(source) != "crossings"
+    flat = colouring(source) == NUMBER
     direction, view.CameraViewUp = ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]) if flat else ([0.0, -1.0, 0.35], [0.0, 0.0, 1.0])
     view.CameraFocalPoint = focus
     view.CameraPosition = [f + d for f, d in zip(focus, direction, strict=True)]
