@@ -7,8 +7,9 @@ import builds
 import numpy as np
 import pytest
 from beams import elastica
+from sweeps import of_one_seed
 
-from dem.body.filament import Filament, Liquid, PreferredCurvature
+from dem.body.filament import Activity, Filament, Liquid, PreferredCurvature
 from dem.engine.links.filaments import LinksFilaments
 from dem.engine.links.shapes import filament_shape
 from dem.engine.links.stable_step import filament_stable_time_step
@@ -16,6 +17,9 @@ from dem.engine.links.stepping import MOST
 from dem.engine.links.world import World
 from dem.errors import InputError
 from dem.physics.contact import ContactLaw
+from studies.registry import shipped
+from templates.sweep.expand import expand
+from templates.sweep.sweep_file import load_sweep
 
 L, D, DENSITY, E = 0.1, 2e-3, 1000.0, 1e6
 B = E * math.pi * D**4 / 64
@@ -318,6 +322,28 @@ def test_a_bend_that_turns_rolls_or_moves_in_space_by_the_ratio_of_drags(ratio: 
     turning = np.polyfit(np.arange(60) * every * made.time_step, np.unwrap(angles), 1)[0]
     assert turning / rate == pytest.approx(ratio / (1 + ratio), rel=0.02)
     assert np.mean(rolls) / rate == pytest.approx(-1 / (1 + ratio), rel=0.04)
+
+
+@pytest.mark.parametrize(("drag", "roll"), [(0.0, 0.986), (3e-9, 0.966), (3e-6, 0.190), (1e-5, 0.075)])
+def test_the_worms_of_blob_tangle_roll_less_the_larger_their_drag(drag: float, roll: float) -> None:
+    # Of results/blob-tangle-loops: 1e-5 N s is the first of 1, 3, 10, … with a tenth of the turns of the wave or less.
+    sweep = shipped("blob-tangle-loops").sweep_file()
+    filament = expand(of_one_seed(load_sweep(sweep)))[0].scene.bodies[0].filament
+    assert isinstance(filament, Filament)
+    assert filament.roll_drag == 1e-5
+    made = world(replace(filament, roll_drag=drag))
+    made.set_time_step(5e-5)
+    made.add_filaments(1, straight(filament))
+    held = LinksFilaments(made)
+    assert made.filaments is not None
+    rate = 2 * math.pi * 2
+    held.act(Activity(curvature=250.0, wavelength=0.06, rate=rate), ramp=0.2)
+    made.advance(round(2.0 / made.time_step))
+    rolls = []
+    for _ in range(400):
+        made.advance(200)
+        rolls.append(made.filaments.spin[:-1].mean())
+    assert -np.mean(rolls) / rate == pytest.approx(roll, abs=5e-3)
 
 
 def test_preferred_curvature_with_a_phase_makes_a_helix() -> None:
