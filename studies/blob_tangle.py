@@ -6,9 +6,10 @@ many loops between reversals (γ = α/2πλ) tangle the worms, few loops untangl
 whose preferred curvature turns about their axis and reverses at random times.
 
 The model assumes the same γ of all worms, and turns of helical bends in place of a head that leads the body. A free
-filament makes these turns by rolling about its axis, not by loops in space, as worms with bristles may. It has no
-swimming, no sense of touch and no escape. A dish holds the blob together, so that crossing numbers also say how dense
-it is; the share of worms that come along with an end piece, as in the study `blob-lift`, says how well they hold.
+filament makes these turns by rolling about its axis; in the variant `loops` a drag against rolling makes it loop in
+space instead. It has no sense of touch and no escape. A dish holds the blob together, so that crossing numbers also
+say how dense it is; the share of worms that come along with an end piece, as in the study `blob-lift`, says how well
+they hold.
 """
 
 import math

@@ -50,7 +50,7 @@ CHAIN: dict[str, Any] = {
 def changed(data: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """A copy with `{"phases.1.duration_s": 2}` and the like put in."""
     copied = copy.deepcopy(dict(data))
-    for key, value in changes.items():
+    for key, value in copy.deepcopy(dict(changes)).items():
         here: Any = copied
         *parents, last = key.split(".")
         for part in parents:

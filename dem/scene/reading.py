@@ -148,6 +148,8 @@ def _plain(scene: Scene) -> dict[str, Any]:
     if scene.shapes is not None:
         del data["smarticle"]
         optional = [entry for entry in optional if entry[0] is not smarticle]
+        filaments = [shape for shape in data["particle"] if shape["shape"] == "filament"]
+        optional += [(shape, {"roll_drag_N_s": 0.0}) for shape in filaments]
     if scene.hooks is not None:
         optional.append((data["hooks"], {"lower_length_m": scene.hooks.length_m, "lower_bars": 1}))
     if scene.protocol is None:

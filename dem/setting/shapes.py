@@ -314,6 +314,12 @@ class Flexible(Shaped):
         0.0, ge=0, le=1.0, description="time τ of internal damping E τ dε/dt of stretching and twisting [s]"
     )
     bending_time_s: float = Field(0.0, ge=0, le=1.0, description="time τ of internal damping of bending [s]")
+    roll_drag_N_s: float = Field(
+        0.0,
+        ge=0,
+        le=1.0,
+        description="torque per length and rate of rolling about the axis, as of bristles, beside the liquid's [N s]",
+    )
     curvature_per_m: float = Field(
         0.0, ge=0, le=1e5, description="curvature that it prefers at rest, in a plane that turns with it [1/m]"
     )
@@ -341,6 +347,7 @@ class Flexible(Shaped):
             bending_time=self.bending_time_s,
             curvature=rest,
             liquid=liquid,
+            roll_drag=self.roll_drag_N_s,
         )
 
 

@@ -138,6 +138,21 @@ def sinking() -> dict[str, Any]:
     return found
 
 
+def rolling(drag: float, rate: float) -> dict[str, float]:
+    """Share of a straight filament's roll that is left after twice the time 1/rate [s] of its drag, and the loss."""
+    engine = built({**ROD, "segments": 10, "roll_drag_N_s": drag}, dt=2e-3 / rate, gravity_m_per_s2=1e-6)
+    put(engine, (0.0, 0.0, 0.2))
+    filaments, states = inside(engine)
+    for state in states:
+        state.angVel = engine._yade.vector(10.0, 0, 0)
+    before = engine.state().kinetic_energy
+    engine.advance(1000)
+    return {
+        "left": min(state.angVel[0] for state in states) / 10.0,
+        "dragged": filaments.energies.dragged / (before - engine.state().kinetic_energy),
+    }
+
+
 WORM: dict[str, Any] = {
     "shape": "filament",
     "length_m": 0.03,

@@ -98,6 +98,13 @@ def test_drag_and_buoyancy_follow_their_formulas(simulate: Simulate) -> None:
         assert found[f"{name} impulse"] == pytest.approx(1.0, rel=1e-9)
 
 
+def test_rolling_decays_at_the_rate_of_its_drag(simulate: Simulate) -> None:
+    drag = 1e-3
+    found = simulate(filament_cases.rolling, drag, drag / (DENSITY * math.pi * D**4 / 32))
+    assert found["left"] == pytest.approx(math.exp(-2), rel=4e-3)
+    assert found["dragged"] == pytest.approx(1.0, abs=5e-3)
+
+
 def test_a_pair_falls_and_collides_as_on_links(simulate: Simulate) -> None:
     links, yade = (simulate(filament_cases.pair, engine, 0.038)["rows"] for engine in ("links", "yade"))
     times = np.linspace(1e-3, 0.037, 73)

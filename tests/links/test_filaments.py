@@ -7,8 +7,9 @@ import builds
 import numpy as np
 import pytest
 from beams import elastica
+from sweeps import of_one_seed
 
-from dem.body.filament import Filament, Liquid, PreferredCurvature
+from dem.body.filament import Activity, Filament, Liquid, PreferredCurvature
 from dem.engine.links.filaments import LinksFilaments
 from dem.engine.links.shapes import filament_shape
 from dem.engine.links.stable_step import filament_stable_time_step
@@ -16,6 +17,9 @@ from dem.engine.links.stepping import MOST
 from dem.engine.links.world import World
 from dem.errors import InputError
 from dem.physics.contact import ContactLaw
+from studies.registry import shipped
+from templates.sweep.expand import expand
+from templates.sweep.sweep_file import load_sweep
 
 L, D, DENSITY, E = 0.1, 2e-3, 1000.0, 1e6
 B = E * math.pi * D**4 / 64
@@ -273,6 +277,75 @@ def test_a_filament_sinks_with_the_speed_of_its_drag(direction: str) -> None:
     np.testing.assert_allclose(made.filaments.velocity, [[0, 0, -speed]] * filament.nodes, atol=1e-4 * speed)
 
 
+@pytest.mark.parametrize("liquid", [None, Liquid(viscosity=0.02, density=900.0)])
+def test_rolling_decays_at_the_rate_of_its_drag(liquid: Liquid | None) -> None:
+    # Torque per length over inertia per length, ρ π d⁴/32; roll drag adds to πμd² of the liquid.
+    drag = 1e-5
+    filament = rod(10, liquid=liquid, roll_drag=drag)
+    rate = (drag + (0.0 if liquid is None else math.pi * liquid.viscosity * D**2)) / (DENSITY * math.pi * D**4 / 32)
+    made = world(filament)
+    made.set_time_step(2e-3 / rate)
+    made.add_filaments(1, straight(filament))
+    held = LinksFilaments(made)
+    assert made.filaments is not None
+    made.filaments.spin[:-1] = 10.0
+    before = held.energies.kinetic
+    made.advance(1000)
+    # It is implicit: of first order in the step.
+    np.testing.assert_allclose(made.filaments.spin[:-1], 10.0 * math.exp(-2), rtol=4e-3)
+    assert held.energies.dragged == pytest.approx(before - held.energies.kinetic, rel=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [1.5, 6.0])
+def test_a_bend_that_turns_rolls_or_moves_in_space_by_the_ratio_of_drags(ratio: float) -> None:
+    # The torque of a shallow arc that turns about its chord at the rate Ω is that of its roll at the rate Ω - α:
+    # ζ κ² L⁵/720 Ω, with ζ across, as the mean square height of the arc is κ² L⁴/720, and c L (α - Ω).
+    bent, rate = 5.0, 1.0
+    filament = replace(rod(20), liquid=viscous(40.0))
+    across, _, own = filament.drags
+    filament = replace(
+        filament,
+        roll_drag=ratio * across * bent**2 * L**4 / 720 - own,
+        curvature=PreferredCurvature(amplitudes=bent, rate=rate),
+    )
+    made = world(filament)
+    made.add_filaments(1, straight(filament))
+    assert made.filaments is not None
+    made.advance(round(0.5 / made.time_step))
+    angles, rolls, every = [], [], round(5e-3 / made.time_step)
+    for _ in range(60):
+        made.advance(every)
+        points = made.filaments.position
+        arrow = points[10] - (points[0] + points[-1]) / 2
+        angles.append(math.atan2(arrow[2], arrow[1]))
+        rolls.append(made.filaments.spin[:-1].mean())
+    turning = np.polyfit(np.arange(60) * every * made.time_step, np.unwrap(angles), 1)[0]
+    assert turning / rate == pytest.approx(ratio / (1 + ratio), rel=0.02)
+    assert np.mean(rolls) / rate == pytest.approx(-1 / (1 + ratio), rel=0.04)
+
+
+@pytest.mark.parametrize(("drag", "roll"), [(0.0, 0.986), (3e-9, 0.966), (3e-6, 0.190), (1e-5, 0.075)])
+def test_the_worms_of_blob_tangle_roll_less_the_larger_their_drag(drag: float, roll: float) -> None:
+    # Of results/blob-tangle-loops: 1e-5 N s is the first of 1, 3, 10, … with a tenth of the turns of the wave or less.
+    sweep = shipped("blob-tangle-loops").sweep_file()
+    filament = expand(of_one_seed(load_sweep(sweep)))[0].scene.bodies[0].filament
+    assert isinstance(filament, Filament)
+    assert filament.roll_drag == 1e-5
+    made = world(replace(filament, roll_drag=drag))
+    made.set_time_step(5e-5)
+    made.add_filaments(1, straight(filament))
+    held = LinksFilaments(made)
+    assert made.filaments is not None
+    rate = 2 * math.pi * 2
+    held.act(Activity(curvature=250.0, wavelength=0.06, rate=rate), ramp=0.2)
+    made.advance(round(2.0 / made.time_step))
+    rolls = []
+    for _ in range(400):
+        made.advance(200)
+        rolls.append(made.filaments.spin[:-1].mean())
+    assert -np.mean(rolls) / rate == pytest.approx(roll, abs=5e-3)
+
+
 def test_preferred_curvature_with_a_phase_makes_a_helix() -> None:
     curvature, torsion = 60.0, 40.0
     segments = 40
@@ -347,8 +420,9 @@ def pile(count: int, *, seed: int = 1, **more: object) -> World:
     return made
 
 
-def test_a_blob_keeps_its_ledger_while_it_acts_falls_and_is_gripped() -> None:
-    made = pile(12)
+@pytest.mark.parametrize("drag", [0.0, 1e-5])
+def test_a_blob_keeps_its_ledger_while_it_acts_falls_and_is_gripped(drag: float) -> None:
+    made = pile(12, roll_drag=drag)
     held = LinksFilaments(made)
     contacts = made.contacts().elastic_energy
     start = held.energies.residual + contacts
@@ -460,17 +534,45 @@ def test_rolling_of_a_bent_filament_is_stable_where_it_is_damped_by_bending(step
     angle, senses = math.radians(60), np.resize([1.0, -1.0], 11)
     curvature = PreferredCurvature(amplitudes=senses * angle / 2.5e-3)
     filament = replace(ACTIVE, young_modulus=2e5, liquid=None, curvature=curvature)
-    turned = np.cumsum([0.0, *(senses * angle)])
-    edges = filament.segment_length * np.column_stack([np.cos(turned), np.sin(turned), 0 * turned])
     made = world(filament)
     made.set_time_step(step)
-    made.add_filaments(1, np.concatenate([np.zeros((1, 3)), np.cumsum(edges, axis=0)])[None] + [0, 0, 0.5])
+    made.add_filaments(1, zigzag(filament, angle))
     assert made.filaments is not None
     made.filaments.spin[:-1] = 1e-3 * np.random.default_rng(1).standard_normal(12)
     with np.errstate(all="ignore"):
         made.advance(4000)
     assert np.abs(made.filaments.spin).max() < 0.1
     assert needed <= made.totals[MOST] < needed + 0.3
+
+
+def zigzag(filament: Filament, angle: float) -> np.ndarray:
+    """Return nodes (1, n, 3) of a filament with bends of an angle [rad] to and fro."""
+    turned = np.cumsum([0.0, *(angle * np.resize([1.0, -1.0], filament.nodes - 2))])
+    edges = filament.segment_length * np.column_stack([np.cos(turned), np.sin(turned), 0 * turned])
+    return np.concatenate([np.zeros((1, 3)), np.cumsum(edges, axis=0)])[None] + [0, 0, 0.5]
+
+
+@pytest.mark.parametrize("drag", [1e-9, 1e-5, 1.0])
+def test_no_roll_drag_adds_energy_or_needs_shorter_steps(drag: float) -> None:
+    # It is let go from a zigzag, rolls and untwists; 1 N s is the largest value of a scene.
+    found = {}
+    for own in (0.0, drag):
+        filament = replace(ACTIVE, liquid=None, curvature=None, roll_drag=own)
+        made = world(filament)
+        law = soft()
+        made.set_time_step(0.9 * filament_stable_time_step(filament, law, made.kinds[0].effective_mass))
+        made.add_filaments(1, zigzag(filament, math.radians(30)))
+        held = LinksFilaments(made)
+        assert made.filaments is not None
+        made.filaments.spin[:-1] = 50 * np.random.default_rng(1).standard_normal(12)
+        stored = [held.energies.stored]
+        for _ in range(400):
+            made.advance(10)
+            stored.append(held.energies.stored)
+        found[own] = made.time_step, made.totals[MOST]
+        assert np.diff(stored).max() < 1e-3 * stored[0]
+        assert stored[-1] < 0.05 * stored[0]
+    assert found[drag] == found[0.0]
 
 
 @pytest.mark.parametrize(
@@ -481,6 +583,8 @@ def test_rolling_of_a_bent_filament_is_stable_where_it_is_damped_by_bending(step
         ({"young_modulus": None}, "young_modulus: is left out"),
         ({"poisson_ratio": 0.6}, "poisson_ratio: 0.6"),
         ({"bending_time": -1.0}, "bending_time: -1"),
+        ({"roll_drag": -1.0}, "roll_drag: -1; give a number of 0 or above"),
+        ({"roll_drag": math.inf}, "roll_drag: inf; give a number of 0 or above"),
         (
             {"curvature": PreferredCurvature(amplitudes=np.ones(3))},
             "amplitudes: shape \\(3,\\); give one number",

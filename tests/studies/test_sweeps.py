@@ -14,7 +14,9 @@ from templates.sweep.expand import Point, expand
 from templates.sweep.sweep_file import load_sweep, on_engine
 
 CODES = ("procedures", "fracture", "strength", "melting", "casting")
-FLEXIBLE = ("blob-lift", "blob-lift-map", "blob-tangle", "blob-topple", "blob-topple-map")  # of filaments, links alone
+FLEXIBLE = (  # of filaments, links alone
+    "blob-lift", "blob-lift-map", "blob-tangle", "blob-tangle-loops", "blob-topple", "blob-topple-map",
+)  # fmt: skip
 AGAIN = {"gravish": 9, "melting": 8}
 
 

@@ -1,6 +1,7 @@
 """Reading scenes of filaments: what they become, and what is refused in one line."""
 
 import copy
+import math
 from typing import Any
 
 import pytest
@@ -22,6 +23,8 @@ BLOB = {
     "fidelity": {"base": "standard", "stiffness_N_per_m": 10},
     "phases": [POUR, WRIGGLE, LIFT, {"type": "release"}],
 }
+
+HASH = "35ac778f3dfbb9e1418b926426edbad40303818361917b2b48a9e0bff3ffba28"  # of BLOB, without keys added later
 
 
 def refused(changes: dict[str, Any]) -> str:
@@ -55,6 +58,16 @@ def test_a_scene_reads_what_it_writes_and_liquid_counts() -> None:
     assert "liquid" not in dump_scene(small({}))
 
 
+def test_scenes_without_roll_drag_keep_the_hash_of_before_it_was_a_key() -> None:
+    bare, none, some = small(BLOB), *(small({**BLOB, "particle.roll_drag_N_s": drag}) for drag in (0.0, 1e-5))
+    assert scene_hash(bare) == scene_hash(none) == HASH
+    assert scene_hash(some) != HASH
+    assert "roll_drag" not in dump_scene(none)
+    assert "roll_drag_N_s: 1.0e-05" in dump_scene(some)
+    filaments = [scene.bodies[0].filament for scene in (bare, some)]
+    assert [each and each.roll_drag for each in filaments] == [0.0, 1e-5]
+
+
 def test_a_wriggle_says_what_filaments_do() -> None:
     phase = Wriggle(type="wriggle", duration_s=1, curvature_per_m=80, frequency_hz=2, turns_between_reversals=0.25)
     activity = phase.activity
@@ -79,6 +92,9 @@ def test_a_plan_has_their_step_and_effects() -> None:
     ({"engine": "lammps"}, "particle: filament on engine: lammps, which has none; use engine: links"),
     ({"particle.segments": 60}, "particle.shape: filament: bar 0: 0.0005 m long; make it longer than its thickness"),
     ({"particle.young_modulus_Pa": -1}, "particle.young_modulus_Pa: -1 is out of range; use at least 1"),
+    ({"particle.roll_drag_N_s": -1}, "particle.roll_drag_N_s: -1 N s is out of range; use at least 0 N s"),
+    ({"particle.roll_drag_N_s": 2}, "particle.roll_drag_N_s: 2 N s is out of range; use at most 1 N s"),
+    ({"particle.roll_drag_N_s": math.inf}, "particle.roll_drag_N_s: inf is not a finite number; give one in N s"),
     ({"particle": {**WORM, "thickness_in_plane_m": 1e-3}}, "particle.diameter_m: a round section has no thicknesses"),
     ({"particle": [WORM, {"shape": "rod", "length_m": 0.01}]}, "particle: filaments and other shapes do not mix"),
     ({"particle": None}, "liquid: only filaments float in it"),
