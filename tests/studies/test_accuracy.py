@@ -25,7 +25,7 @@ from studies.accuracy import (
     TIME_STEP,
     VARIANT,
     WALL,
-    Promises,
+    Fidelities,
     Rung,
     advise,
     main,
@@ -221,9 +221,9 @@ def test_an_error_without_a_band_is_not_the_largest() -> None:
 def test_fidelities_without_a_cost_are_drawn_nowhere(cost: float, tmp_path: Path) -> None:
     table = ladder_of_fidelities()
     table.loc[0, COST] = cost
-    assert Promises().compare(tmp_path / "one", {"shaken": table}, ["A footer."])
+    assert Fidelities().compare(tmp_path / "one", {"shaken": table}, ["A footer."])
     table[COST] = cost
-    assert Promises().compare(tmp_path / "all", {"shaken": table}, ["A footer."])
+    assert Fidelities().compare(tmp_path / "all", {"shaken": table}, ["A footer."])
 
 
 def test_the_figure_of_several_ladders_is_drawn_from_their_tables(tmp_path: Path) -> None:
