@@ -119,7 +119,7 @@ def measure(run: Run) -> Row:
         PEAK: highest.force / weight,
         LOG_PEAK: math.log10(highest.force / weight) if highest.force > 0 else math.nan,
         ABOVE: int((body_centres(free)[:, 2] >= hook).sum()),
-        STRENGTH: max(0.0, peak(replace(pull, force=pull.held)).force) / weight,
+        STRENGTH: float(np.maximum(0.0, peak(replace(pull, force=pull.held)).force)) / weight,
         RAISED: highest.raised,
         WORK: pull.work / weight / run.manifest.middle_length_m,
         BEFORE: pull.before / weight,
@@ -132,7 +132,7 @@ def measure(run: Run) -> Row:
 def pull_of(run: Run) -> HookPull:
     """Return the pull that ends a run.
 
-    Of a test between grips the moving one is the upper hook; the load before is NaN.
+    Of a test between grips the moving one is the upper hook; load before and force on the lower hook are NaN.
     """
     phase = run.phases[-1]
     if phase.type == PULL:
@@ -142,7 +142,7 @@ def pull_of(run: Run) -> HookPull:
         edges=test.interval * np.arange(len(test.pulls) + 1),
         raised=np.concatenate([[0.0], test.elongations]),
         force=test.pulls,
-        held=test.held,
+        held=np.full_like(test.held, math.nan),  # the floor pushes what the resting grip holds
         before=math.nan,
         engine_work=math.nan,
         residual=math.nan,
