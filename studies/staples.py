@@ -139,7 +139,7 @@ def pull_of(run: Run) -> HookPull:
         return read_pull(run, run.series, phase.index)
     test = read_tension(run, run.series, phase.index)
     return HookPull(
-        edges=test.interval * np.arange(len(test.pulls) + 1),
+        edges=np.arange(len(test.pulls) + 1, dtype=np.float64) * test.interval,
         raised=np.concatenate([[0.0], test.elongations]),
         force=test.pulls,
         held=np.full_like(test.held, math.nan),  # the floor pushes what the resting grip holds
