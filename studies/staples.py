@@ -3,10 +3,11 @@
 Sohn, Pezeshki and Barthelat (arXiv 2510.09933) find that staples of 90° entangle more when they are poured, that
 vibration entangles those of 20° faster, and that bundles of 20° then are almost ten times as strong; one to three
 chains carry the tension (arXiv 2412.05415). Here a pile is poured onto a grid, vibrated or not, freed of the wall, and
-torn by a hook above the grid.
+torn by a hook above the grid. In the variant `grips` a column within a smooth wall is torn between two grips, which
+hold its bottom and its top.
 
 Piles of both angles are paired by seed. If the hook stops at its force limit ("held fast"), the peak force is a lower
-bound.
+bound. Of a test between grips the moving grip is called the hook, and the one that rests the grid.
 """
 
 import math
@@ -24,15 +25,24 @@ from dem.record.run import Run
 from postprocess.geometry.bars import body_centres
 from postprocess.measures.entanglement import polygon_crossings
 from postprocess.measures.graph import entanglement_graph
-from postprocess.measures.pull import PULL, WINDOW, held_fast, peak, read_pull, weight_of_one
+from postprocess.measures.grips import TENSION, read_tension
+from postprocess.measures.pull import (
+    PULL,
+    WINDOW,
+    HookPull,
+    held_fast,
+    moving_mean,
+    peak,
+    read_pull,
+    weight_of_one,
+)
 from postprocess.statistics.points import SEED, paired_differences
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
-from studies.framework.figures import Histories, Means, one_by_one
+from studies.framework.figures import Histories, History, Means, one_by_one
 from studies.framework.findings import Effect, Finding, Outcome, means_by
 from studies.framework.provenance import Reference
 from studies.framework.runs import Key, Row, declare, last_columns, run_columns
 from studies.framework.study import COUNT, Study
-from studies.strength import force_history
 
 ANGLE, GAMMA = "crown-leg angle [deg]", "peak acceleration [g]"
 NARROW, SQUARE = 20.0, 90.0  #: The two angles that are compared [deg]
@@ -44,6 +54,8 @@ POURED, LINKS, HEIGHT = "links per staple poured [-]", "links per staple [-]", "
 
 TIMES = 5.0  #: Ratio of strengths above which "almost ten times" counts as found: half of ten
 MOST_CHAINS = 3.0  #: Largest number of chains that the paper states
+#: Phases of the two tests, but for a vibration and its rest: between a grid and a hook, and between two grips
+TESTS = (("deposit", "relax", "remove-container", PULL), ("deposit", "relax", TENSION))
 CUTS = (0.25, 0.5, 0.75)  #: Heights above the grid at which chains are counted, over the distance from grid to hook
 
 QUANTITIES = declare(
@@ -83,41 +95,76 @@ QUANTITIES = declare(
 
 def measure(run: Run) -> Row:
     """Measure links before and after vibration, hook force, and chains at its peak; return the run's row."""
-    phases, hooks = run.phases, run.scene.get("hooks")
+    phases = run.phases
     types = tuple(phase.type for phase in phases)
-    shaken = types == ("deposit", "relax", "shake", "relax", "remove-container", PULL)
-    if hooks is None or not (shaken or types == ("deposit", "relax", "remove-container", PULL)):
+    shaken = types[2:4] == ("shake", "relax")
+    if types[:2] + types[4 if shaken else 2 :] not in TESTS:
         raise InputError(f"{run.path}: not a pour, a rest, a vibration with a rest or none, and a pull; leave it out")
     parts = [run.frames.in_phase(phase.index) for phase in phases]
     if not all(parts[1:]):
         raise InputError(f"{run.path}: no frame of a phase; run it again")
-    pull = read_pull(run, run.series, phases[-1].index)
+    pull = pull_of(run)
     highest, weight = peak(pull), weight_of_one(run)
-    settings = run.scene["phases"][-1]
     free, frames = parts[-2][-1], parts[-1]
     since = np.array([frame.time for frame in frames]) - free.time
     torn = frames[int(np.abs(since - highest.time).argmin())]
-    grid = free.floor_z + hooks["lower_height_m"]
-    hook = free.floor_z + hooks["upper_height_m"]
-    higher = int((body_centres(free)[:, 2] > hook).sum())
+    grid, hook = free_between(run, free)
     return {
         ANGLE: angle_of(run),
         GAMMA: float(run.scene["phases"][2]["peak_acceleration_g"]) if shaken else 0.0,
         **{name: value for name, value in run_columns(run).items() if name in (SEED, COUNT, "fidelity")},
         POURED: links_per_body(parts[1][-1]),
-        LINKS: links_per_body(parts[-3][-1]),
+        LINKS: links_per_body(parts[3 if shaken else 1][-1]),
         HEIGHT: float(body_centres(free)[:, 2].mean()) - free.floor_z,
         PEAK: highest.force / weight,
         LOG_PEAK: math.log10(highest.force / weight) if highest.force > 0 else math.nan,
-        ABOVE: higher,
-        STRENGTH: max(0.0, peak(replace(pull, force=pull.held)).force) / weight,
+        ABOVE: int((body_centres(free)[:, 2] >= hook).sum()),
+        STRENGTH: float(np.maximum(0.0, peak(replace(pull, force=pull.held)).force)) / weight,
         RAISED: highest.raised,
         WORK: pull.work / weight / run.manifest.middle_length_m,
         BEFORE: pull.before / weight,
-        HELD_FAST: float(held_fast(pull, settings)),
+        HELD_FAST: float(held_fast(pull, run.scene["phases"][-1])),
         CHAINS: chains_between(torn, grid, hook + highest.raised) if run.forces is not None else math.nan,
         **last_columns(run),
     }
+
+
+def pull_of(run: Run) -> HookPull:
+    """Return the pull that ends a run.
+
+    Of a test between grips the moving one is the upper hook; load before and force on the lower hook are NaN.
+    """
+    phase = run.phases[-1]
+    if phase.type == PULL:
+        return read_pull(run, run.series, phase.index)
+    test = read_tension(run, run.series, phase.index)
+    return HookPull(
+        edges=np.arange(len(test.pulls) + 1, dtype=np.float64) * test.interval,
+        raised=np.concatenate([[0.0], test.elongations]),
+        force=test.pulls,
+        held=np.full_like(test.held, math.nan),  # the floor pushes what the resting grip holds
+        before=math.nan,
+        engine_work=math.nan,
+        residual=math.nan,
+    )
+
+
+def free_between(run: Run, free: Frame) -> tuple[float, float]:
+    """Return the heights [m] between which a pile is free: grid and hook, or edges of the grips.
+
+    `free`: the last frame before the pull. Grips hold the bodies with their centre beyond these heights.
+    """
+    if (hooks := run.scene.get("hooks")) is not None:
+        return free.floor_z + hooks["lower_height_m"], free.floor_z + hooks["upper_height_m"]
+    heights, grip = body_centres(free)[:, 2], run.scene["phases"][-1]["grip_m"]
+    return float(heights.min()) + grip, float(heights.max()) - grip
+
+
+def force_history(run: Run) -> History:
+    """Read the force on the hook over the weight of one staple [-] against its displacement [mm]."""
+    pull = pull_of(run)
+    times, force = moving_mean(pull)
+    return History(times=1e3 * np.interp(times, pull.edges, pull.raised), values=force / weight_of_one(run))
 
 
 def angle_of(run: Run) -> float:
@@ -317,7 +364,7 @@ _BY_ANGLE = one_by_one(ANGLE, "{:g}°".format, last=0.6)
 FIGURES = (
     Histories(
         name="force_raised",
-        history=partial(force_history, of_one=True),
+        history=force_history,
         split=_BY_ANGLE,
         panels=GAMMA,
         panel="Γ = {:g}",

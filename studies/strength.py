@@ -155,12 +155,12 @@ def measure(run: Run) -> Row:
     }
 
 
-def force_history(run: Run, *, of_one: bool = False) -> History:
-    """Read the force on the hook over the weight of the pile, or of one body [-], against its displacement [mm]."""
+def force_history(run: Run) -> History:
+    """Read the force on the hook over the weight of the pile [-] against its displacement [mm]."""
     pull = read_pull(run, run.series, run.phases[-1].index)
     times, force = moving_mean(pull)
     displacement = 1e3 * np.interp(times, pull.edges, pull.raised)
-    return History(times=displacement, values=force / (1 if of_one else run.manifest.count) / weight_of_one(run))
+    return History(times=displacement, values=force / run.manifest.count / weight_of_one(run))
 
 
 def over_heights(runs: pd.DataFrame) -> pd.DataFrame:

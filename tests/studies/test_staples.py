@@ -7,9 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from synthetic import SyntheticRun, write_frame
+from synthetic import SyntheticRun, write_frame, write_run, write_series
 from synthetic.forces import pressed, write_forces
-from synthetic.hooked import HELD, UPPER, weight, write_hooked_run
+from synthetic.hooked import GRAVITY, HELD, UPPER, weight, write_hooked_run
 from synthetic.shapes import W
 
 from dem.errors import InputError
@@ -69,6 +69,37 @@ def test_measures_are_those_put_in(tmp_path: Path) -> None:
     centres = SyntheticRun().shares() * SyntheticRun().height(DEPTH)
     assert row[ABOVE] == pytest.approx((centres > UPPER).sum(), abs=1)
     assert np.isnan(row[CHAINS])  # no recorded forces
+
+
+def test_a_test_between_grips_has_the_columns_of_a_hook(tmp_path: Path) -> None:
+    run = SyntheticRun(phases=("deposit", "relax", "shake", "relax", "tension"), packing=(DEPTH,) * 5, shake_time=2.0)
+    directory = write_run(tmp_path / "one", run)
+    path = directory / "scene.yaml"
+    scene = yaml.safe_load(path.read_text())
+    grip, speed, rest, step = run.height(DEPTH) / 4, 0.01, 4.0, 0.004
+    scene["gravity_m_per_s2"], scene["phases"][2]["peak_acceleration_g"] = GRAVITY, 6.0
+    scene["phases"][-1] |= {"axis": "z", "grip_m": grip, "distance_m": 2 * speed, "force_limit_N": 1.0}
+    path.write_text(yaml.safe_dump(scene))
+    since = step * np.arange(1, 501)
+    forces = np.zeros((500, 3))
+    forces[:, 2] = 7 * weight(run) * np.clip(1 - np.abs(since - APEX) / BASE, 0, None)
+    columns = {"elongation_m": speed * since, "grip_distance_m": 0.01 + speed * since}
+    columns |= {"grip_moved_force_N": -forces, "grip_fixed_force_N": HELD * forces}
+    columns |= {"time_s": rest + since, "phase": np.full(500, 4), "container_z_m": np.zeros(500)}
+    write_series(directory, columns, seed=1)
+    opened = open_run(directory)
+    row: dict[str, Any] = STUDY.measure(opened)  # type: ignore[assignment]
+    highest = 7 * (1 - WINDOW / BASE / 4)
+    assert row[PEAK] == pytest.approx(highest, rel=1e-2)
+    assert (row[GAMMA], row[HELD_FAST]) == (6.0, 0)
+    assert row[RAISED] == pytest.approx(speed * APEX, rel=0.01)
+    assert row[WORK] == pytest.approx(7 * BASE * speed / W, rel=0.01)
+    centres = run.shares() * run.height(DEPTH)
+    assert row[ABOVE] == (centres >= centres.max() - grip - 1e-9).sum()
+    assert np.isnan([row[BEFORE], row[STRENGTH]]).all()
+    free = opened.frames.in_phase(3)[-1]
+    assert staples.free_between(opened, free) == pytest.approx((centres.min() + grip, centres.max() - grip), rel=5e-3)
+    assert staples.force_history(opened).values.max() == pytest.approx(highest, rel=1e-2)
 
 
 def test_runs_that_are_no_pull_are_left_out(tmp_path: Path) -> None:

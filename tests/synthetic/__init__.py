@@ -66,7 +66,7 @@ class SyntheticRun:
         """Duration of each type of phase [s]."""
         fixed = {"deposit": 1.0, "relax": 0.5, "shape-change": 3.0, "pull-hook": 2.0, "remove-container": 2.0}
         driven = {"shake": self.shake_time, "internal-oscillation": self.oscillate_time}
-        return {**fixed, **driven, "arrange": 1.0, "strain": 3.0}
+        return {**fixed, **driven, "arrange": 1.0, "strain": 3.0, "tension": 2.0}
 
     def shares(self) -> NDArray[np.float64]:
         """(N,) centres of mass over the second-highest one."""
