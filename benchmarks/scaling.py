@@ -28,7 +28,7 @@ from dem.record.run import open_run
 from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 
 COUNTS = (50, 100, 270, 1000, 2000, 5000, 10_000, 20_000)
-INTERVALS, STEPS = 80, 4  # timed intervals, and steps per interval: one period at 30 Hz
+STEPS = 4  # per timed interval
 AMPLITUDE, FREQUENCY = 0.552e-3, 30.0  # shaking of the paper [m, Hz], Γ = 2
 WALL, PROCESSOR = "wall time per step and smarticle [us]", "processor time per step and smarticle [us]"
 
@@ -36,21 +36,23 @@ WALL, PROCESSOR = "wall time per step and smarticle [us]", "processor time per s
 def time_intervals(run: Path) -> dict[str, Any]:
     """Load the last checkpoint of a run and time the shaking of its pile.
 
-    Returns lists of wall and processor time of each interval [s], contacts per smarticle, and peak memory [MiB].
+    Returns lists of wall and processor time of each interval of one period [s], contacts per smarticle, and peak memory
+    [MiB].
     """
     scene, made_by = load_scene(run / "scene.yaml"), open_run(run).manifest.versions["links"]
     # The scene needs a phase that shakes, or the engine is built without a moving container.
     content = yaml.safe_load(dump_scene(scene))
     content["phases"].append({"type": "shake", "duration_s": 1.0, "frequency_hz": FREQUENCY})
     shaken = parse_scene(content, source=str(run))
-    engine = engine_kind("links").build(shaken, min(time_steps(shaken)))
+    time_step = min(time_steps(shaken))
+    engine = engine_kind("links").build(shaken, time_step)
     checkpoint, _ = read_checkpoint(run, scene_sha256=scene_hash(scene), made_by=("links", made_by))
     state: dict[str, Any] = dict(checkpoint.state)
     engine.load(Saved(content=checkpoint.engine, memory=state["engine"]), run)
     engine.boundaries.shake(amplitude=AMPLITUDE, frequency=FREQUENCY)
     engine.advance(30)
     wall, processor = [], []
-    for _ in range(INTERVALS):
+    for _ in range(round(1 / (FREQUENCY * STEPS * time_step))):
         begun, spent = time.perf_counter(), time.process_time()
         engine.advance(STEPS)
         wall.append(time.perf_counter() - begun)
@@ -74,7 +76,7 @@ def row_of(run: Path, count: int, repeats: int) -> dict[str, Any]:
         json.loads(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout)
         for _ in range(repeats)
     ]
-    each = 1e6 / (STEPS * INTERVALS * count)
+    each = 1e6 / (STEPS * len(found[0]["wall"]) * count)
     wall, processor = (
         each * np.min([timing.pop(kind) for timing in found], axis=0).sum() for kind in ("wall", "processor")
     )
