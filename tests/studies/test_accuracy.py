@@ -89,7 +89,7 @@ LINKS = ["shaken", "oscillation", "shape-change"]
 @pytest.mark.parametrize(
     "name",
     [
-        *("accuracy", "accuracy/reference", "accuracy/oscillation", "accuracy-links/knobs"),
+        *("accuracy", "accuracy/reference", "accuracy/oscillation", "accuracy-links/knobs", "accuracy-links/yade"),
         *(f"accuracy-links/{scene}" for scene in LINKS),
     ],
 )
