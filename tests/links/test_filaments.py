@@ -326,7 +326,7 @@ def test_a_bend_that_turns_rolls_or_moves_in_space_by_the_ratio_of_drags(ratio: 
 
 @pytest.mark.parametrize(("drag", "roll"), [(0.0, 0.986), (3e-9, 0.966), (3e-6, 0.190), (1e-5, 0.075)])
 def test_the_worms_of_blob_tangle_roll_less_the_larger_their_drag(drag: float, roll: float) -> None:
-    # Of results/blob-tangle-loops: 1e-5 N s is the first of 1, 3, 10, … with a tenth of the turns of the wave or less.
+    # results/blob-tangle-loops: 1e-5 is the first of 1e-9, 3e-9, 1e-8, … N s with a tenth of the wave's turns or less.
     sweep = shipped("blob-tangle-loops").sweep_file()
     filament = expand(of_one_seed(load_sweep(sweep)))[0].scene.bodies[0].filament
     assert isinstance(filament, Filament)
