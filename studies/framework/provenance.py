@@ -11,6 +11,8 @@ from types import MappingProxyType
 import pandas as pd
 
 from dem.errors import InputError
+from dem.record.run import Run
+from dem.setting.fidelity import fidelities as named_fidelities
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import LAST_FRAMES
 from postprocess.report.tables import table_lines, whole_file
@@ -65,7 +67,9 @@ class Origin:
     @property
     def _which(self) -> str:
         used, missing = len(self.found.runs), len(self.found.missing)
-        fidelities = ", ".join(dict.fromkeys(run.run.manifest.fidelity for run in self.found.runs))
+        several = list(dict.fromkeys(_fidelity(run.run) for run in self.found.runs))
+        more = [f"{len(several) - 4} more"] if len(several) > 4 else []
+        fidelities = ", ".join(several[:4] + more)
         engines = "" if self._engines == ["yade"] else f", engine {' and '.join(self._engines)}"
         lacking = f", {missing} missing" if missing else ""
         return f"Study {self.found.study}, fidelity {fidelities}{engines}: {used} of {used + missing} runs{lacking}"
@@ -188,3 +192,12 @@ def make_folder(path: Path | str) -> Path:
     except OSError as error:
         raise InputError(f"cannot write to {path}: {error.strerror}; choose another folder as output") from None
     return path
+
+
+def _fidelity(run: Run) -> str:
+    """Return the fidelity of a run, with its rows and stiffness where they are not those of the named fidelity."""
+    knobs, base = run.scene.get("fidelity", {}), run.manifest.fidelity
+    named = named_fidelities(run.manifest.engine)[base]
+    shown = {"rows": "rows {:g}", "stiffness_N_per_m": "{:g} N/m"}
+    changed = [text.format(knobs[key]) for key, text in shown.items() if knobs.get(key, named[key]) != named[key]]
+    return f"{base} ({', '.join(changed)})" if changed else base

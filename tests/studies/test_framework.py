@@ -52,11 +52,13 @@ TOY = Study(
 )
 
 
-def write(directory: Path, *, status: str = "done", name: str = "toy", **run: Any) -> Path:
-    """A run of one phase, without frames."""
+def write(directory: Path, *, status: str = "done", name: str = "toy", rows: int = 1, **run: Any) -> Path:
+    """A run of one phase, without frames, with `rows` of spheres per link."""
     made = SyntheticRun(phases=("relax",), name=name, **run)
     directory.mkdir(parents=True)
     write_manifest(directory, made)
+    scene = {"phases": [{"type": "relax", "duration_s": 0.5}], "fidelity": {"base": made.fidelity, "rows": rows}}
+    (directory / "scene.yaml").write_text(json.dumps(scene))
     timed = [{"index": 0, "type": "relax", "start_s": 0.0, "end_s": 0.5, "wall_s": 1.0}]
     done = {"status": "done", "time_s": 0.5, "steps": 10, "wall_s": 1.0, "phases": timed}
     failed = {"status": status, "cause": "a smarticle escaped", "time_s": 0.2}
@@ -105,6 +107,12 @@ def test_every_output_names_its_origin(runs: list[Path], tmp_path: Path) -> None
     assert (origin["study"], origin["command"]) == ("toy", ORIGIN["command"])
     assert [run["directory"] for run in origin["runs"]] == list(map(str, runs[:2]))
     assert "Note: the full study as shipped" in TOY.analyse(runs[:2], tmp_path / "out", **ORIGIN).footer
+
+
+def test_footers_say_where_a_fidelity_is_not_the_named_one(tmp_path: Path) -> None:
+    runs = [write(tmp_path / f"{rows}", seed=rows, rows=rows) for rows in (1, 2)]
+    first, *_ = TOY.analyse(runs, tmp_path / "out", **ORIGIN).footer
+    assert first.startswith("Study toy, fidelity draft, draft (rows 2): 2 of 2 runs")
 
 
 def test_missing_runs_are_listed_with_their_cause(runs: list[Path], tmp_path: Path) -> None:
