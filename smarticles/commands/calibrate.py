@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import fmean
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from templates.sweep.folder import Folder
     from templates.sweep.render import Value
 
+_PRICED = 8  # points whose costs stand for those of all points of a wave
 _FILE_HELP = """
 A calibration file names a scene, its free parameters, and measured data:
 
@@ -200,12 +202,13 @@ def _listing(problem: Problem) -> str:
     from studies.calibration.inference import first_points  # noqa: PLC0415
 
     size, rows, total = problem.points_per_wave, [], 0.0
-    theta = first_points(problem, size)[:1]
+    # Costs depend on parameters, such as restitution. Points of later waves are not known yet, and count as the first.
+    theta = first_points(problem, size)[:_PRICED]
     for wave in range(1, problem.content.waves + 1):
-        # Points of later waves are not known yet; all cost about as much as the first one.
         _, points = problem.sweep(wave, theta)
-        hours = size * sum(sweeps.expected_wall_s(point.scene) for point in points) / 3600
-        rows.append([wave, size, len(problem.conditions_of(wave)), problem.content.seeds, size * len(points), hours])
+        count = size * len(points) // len(theta)
+        hours = count * fmean([sweeps.expected_wall_s(point.scene) for point in points]) / 3600
+        rows.append([wave, size, len(problem.conditions_of(wave)), problem.content.seeds, count, hours])
         total += hours
     header = ["wave", "points", "conditions", "seeds", "runs", "expected h"]
     runs = sum(row[4] for row in rows)

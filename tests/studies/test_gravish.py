@@ -12,7 +12,7 @@ from synthetic import SyntheticRun, write_run
 from dem.record.run import open_run
 from postprocess.statistics.points import ASPECT, SEED
 from studies.framework.shaken import AT_REST, SHAKEN, STAGES, phi, read_gravish
-from studies.gravish import STUDY, deviations, measure, steps
+from studies.gravish import CONTACT, PAPER, STUDY, deviations, measure, steps
 from studies.registry import shipped
 
 SPREAD = {1: -0.002, 2: 0.0, 3: 0.002}
@@ -76,30 +76,62 @@ def test_phi_f_is_compared_at_rest_where_runs_have_it() -> None:
 
 
 def test_at_rest_is_the_last_frame_and_not_the_fall(tmp_path: Path) -> None:
-    run = open_run(write_run(tmp_path / "run", SyntheticRun(packing=(0.1, 0.105, 0.13, 0.15))))
+    run = open_run(write_run(tmp_path / "run", SyntheticRun(packing=(0.1, 0.105, 0.13, 0.15), friction=0.4)))
     row = measure(run)
+    assert row[CONTACT] == PAPER
     assert row[phi(AT_REST)] == pytest.approx(0.15 * 0.998)  # frames alternate by ±0.2 % about the packing
     assert row[phi("phi_f relaxed")] == pytest.approx(0.15)
 
 
-def test_the_figure_shows_fully_shaken_piles_alone() -> None:
+OTHER = "friction 0.5, 1 at the container, restitution 0.7"
+
+
+def with_contacts(runs: pd.DataFrame) -> pd.DataFrame:
+    """Each run twice: with the contact of Savoie et al., and with one that packs 10 % less."""
+    less = runs.assign(**{name: 0.9 * runs[name] for name in runs if str(name).startswith("phi")})
+    return pd.concat([runs.assign(**{CONTACT: PAPER}), less.assign(**{CONTACT: OTHER})], ignore_index=True)
+
+
+def test_the_figure_shows_fully_shaken_piles_at_rest_for_each_contact() -> None:
     runs = runs_of({0.4: (0.14, 0.16), 0.7: (0.1155, 0.130)})
     runs = runs.assign(**{phi(AT_REST): 1.1 * runs[phi("phi_f")], SHAKEN: np.where(runs[ASPECT] > 0.5, 20.0, 1.5)})
+    runs = with_contacts(runs)
     for name in STUDY.quantities:
         runs[name.column] = runs.get(name.column, np.nan)
     figure = next(one for one in STUDY.figures if one.name == "phi")
     drawn = figure.split(figure.rows(STUDY.points(runs)))  # type: ignore[attr-defined]
+    assert [one.label for one in drawn] == [PAPER, OTHER]
     values = {one.label: one.rows.set_index(ASPECT)[[phi("phi_0"), phi("phi_f")]].round(4) for one in drawn}
-    assert values["after rest"].loc[0.7].tolist() == [0.1155, 0.143]
-    assert values["while shaken"].loc[0.7].isna().tolist() == [True, False]
-    assert values["after rest"].loc[0.4].isna().tolist() == [False, True]  # shaken for 1.5 s beside 20 s
-    found = STUDY.extra(runs)["deviations"].set_index(ASPECT)["stage"]
-    assert (found.loc[[0.4]].tolist(), set(found.loc[0.7])) == (["phi_0"], {"phi_0", "phi_f", AT_REST})
+    assert values[PAPER].loc[0.7].tolist() == [0.1155, 0.143]
+    assert values[OTHER].loc[0.7].tolist() == pytest.approx([0.1040, 0.1287], abs=1e-4)
+    assert values[PAPER].loc[0.4].isna().tolist() == [False, True]  # shaken for 1.5 s beside 20 s
+    found = STUDY.extra(runs)["deviations"].set_index([CONTACT, ASPECT])["stage"]
+    assert (found.loc[[(PAPER, 0.4)]].tolist(), set(found.loc[(OTHER, 0.7)])) == (
+        ["phi_0"],
+        {"phi_0", "phi_f", AT_REST},
+    )
+
+
+def test_each_contact_has_verdicts_of_its_own() -> None:
+    runs = with_contacts(runs_of({0.5: (0.14, 0.165), 0.7: (0.117, 0.145)}))
+    judged = {one.id: one.judge(runs) for one in STUDY.findings}
+    assert judged["phi-f-near"].verdict == "not found"  # 11.5 %
+    assert judged["phi-f-near-calibrated"].verdict == "found"  # 0.4 %
+    alone = runs[runs[CONTACT] == PAPER]
+    assert (
+        judged["phi-0-falls"].ours == next(one for one in STUDY.findings if one.id == "phi-0-falls").judge(alone).ours
+    )
+    assert (
+        next(one for one in STUDY.findings if one.id == "phi-f-near-calibrated").judge(alone).verdict == "not resolved"
+    )
 
 
 def test_figures_of_a_quick_study_say_what_the_full_study_found(tmp_path: Path) -> None:
     runs = [
-        write_run(tmp_path / f"{aspect}_{seed}", SyntheticRun(aspect_ratio=aspect, seed=seed, frames_per_phase=1))
+        write_run(
+            tmp_path / f"{aspect}_{seed}",
+            SyntheticRun(aspect_ratio=aspect, seed=seed, frames_per_phase=1, friction=0.4),
+        )
         for aspect in (0.4, 0.7)
         for seed in (1, 2)
     ]

@@ -1,6 +1,7 @@
 """calibrate: from the command line over waves that are sweeps to the preset."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -63,6 +64,22 @@ def test_a_dry_run_lists_the_waves(calibration: Path, smarticles: Smarticles) ->
     assert said.out.splitlines()[-1].startswith("24 runs of a budget of 24, about ")
     assert sorted(calibration.parent.iterdir()) == before
     assert "calibrate: --out DIR is missing" in smarticles("calibrate", calibration).err
+
+
+def test_a_dry_run_prices_the_parameters_that_will_be_tried(calibration: Path, smarticles: Smarticles) -> None:
+    # A restitution of 0.1 asks for a time step a sixth as long as one of 0.8.
+    scene = calibration.parent / "scene.yaml"
+    scene.write_text(scene.read_text().replace("0.3}", "30}"))
+    hours = []
+    for low, high in ((0.1, 0.12), (0.8, 0.82)):
+        free = f"mu: {{low: 0.2, high: 1.0}}, e: {{low: {low}, high: {high}}}"
+        text = CALIBRATION.replace("mu: {low: 0.2, high: 1.0}", free).replace(
+            "{mu: c", "{e: contact.restitution, mu: c"
+        )
+        calibration.write_text(text)
+        said = smarticles("calibrate", calibration, "--dry-run")
+        hours.append(float(re.findall(r"about (\S+) h of one core", said.out)[0]))
+    assert hours[0] > 1.5 * hours[1]  # every run starts at the same cost
 
 
 def test_waves_are_sweeps_that_the_repeated_command_continues(
