@@ -70,7 +70,7 @@ QUANTITIES = declare(
     },
     axes={
         phi("phi_0"): r"$\phi_0$ before shaking [-]",
-        phi("phi_f"): r"$\phi_\mathrm{f}$ after shaking [-]",
+        phi("phi_f"): r"$\phi_\mathrm{f}$ after shaking, at rest [-]",
         "crossings before [-]": f"{CROSSINGS_LABEL}\nbefore shaking",
         "crossings after [-]": f"{CROSSINGS_LABEL}\nat the end of shaking",
     },
@@ -90,7 +90,7 @@ def contact_text(run: Run) -> str:
     between, wall, restitution = (contact[key] for key in ("friction_smarticle", "friction_wall", "restitution"))
     if (between, wall, restitution) == (0.4, 0.4, 0.7):
         return PAPER
-    return f"friction {between:g}, {wall:g} at the container, restitution {restitution:g}"
+    return f"friction {between:.3g}, {wall:.3g} at the container, restitution {restitution:.3g}"
 
 
 def _with_paper(runs: pd.DataFrame) -> pd.DataFrame:
@@ -239,10 +239,15 @@ def _fully_shaken(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def _at_rest(points: pd.DataFrame) -> pd.DataFrame:
-    """Return points in which φ_f is that of piles at rest; φ_f is NaN unless the time of shaking is the longest."""
+    """Return points in which φ_f is that of piles at rest; φ_f is NaN unless the time of shaking is the longest.
+
+    For tables of earlier versions, without φ of the last frame, it is the mean over the relaxation after shaking.
+    """
     points = _fully_shaken(points)
+    rest, settling = ([phi(stage), marked(phi(stage), "95 %")] for stage in (AT_REST, "phi_f relaxed"))
+    shown = [phi("phi_f"), marked(phi("phi_f"), "95 %")]
     return points.assign(
-        **{name.replace(AT_REST, "phi_f"): points[name] for name in (phi(AT_REST), marked(phi(AT_REST), "95 %"))}
+        **{name: points[one].fillna(points[other]) for name, one, other in zip(shown, rest, settling, strict=True)}
     )
 
 
@@ -290,7 +295,7 @@ STUDY = Study(
             rows=_at_rest,
             split=_by_contact,
             share_y=True,
-            published="Gravish 2012",
+            published="experiment (Gravish 2012)",
             reference={
                 phi(stage): (_PUBLISHED["l_over_w"], _PUBLISHED[GRAVISH_COLUMNS[stage]]) for stage in ("phi_0", "phi_f")
             },

@@ -11,6 +11,7 @@ from types import MappingProxyType
 import pandas as pd
 
 from dem.errors import InputError
+from dem.record.names import SCENE
 from dem.record.run import Run
 from dem.setting.fidelity import fidelities as named_fidelities
 from postprocess.measures.packing import DEFINITIONS
@@ -195,8 +196,12 @@ def make_folder(path: Path | str) -> Path:
 
 
 def _fidelity(run: Run) -> str:
-    """Return the fidelity of a run, with its rows and stiffness where they are not those of the named fidelity."""
-    knobs, base = run.scene.get("fidelity", {}), run.manifest.fidelity
+    """Return the fidelity of a run, with its rows and stiffness where they are not those of the named fidelity.
+
+    Runs whose directories are gone, known from the tables of an earlier analysis, have the name alone.
+    """
+    base = run.manifest.fidelity
+    knobs = run.scene.get("fidelity", {}) if (run.path / SCENE).exists() else {}
     named = named_fidelities(run.manifest.engine)[base]
     shown = {"rows": "rows {:g}", "stiffness_N_per_m": "{:g} N/m"}
     changed = [text.format(knobs[key]) for key, text in shown.items() if knobs.get(key, named[key]) != named[key]]

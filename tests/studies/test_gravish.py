@@ -140,4 +140,4 @@ def test_figures_of_a_quick_study_say_what_the_full_study_found(tmp_path: Path) 
     for name in ("phi", "crossings", "phi_time"):
         texts = re.findall(r"<text[^>]*>([^<]*)</text>", report.files[f"{name}.svg"].read_text(encoding="utf-8"))
         assert f"Not the full study, which found: {full}" in " ".join(texts)
-        assert {"phi": "Gravish 2012", "crossings": "0.40", "phi_time": "l/w = 0.7"}[name] in texts
+        assert {"phi": "experiment (Gravish 2012)", "crossings": "0.40", "phi_time": "l/w = 0.7"}[name] in texts
