@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
+from dem.body.particle import mean_width
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.geometry.outline import BALL
@@ -84,7 +85,8 @@ def measure(run: Run) -> Row:
     after = frames[int(np.argmin(np.abs(frames.times - start - AFTER)))]
     one, other = (frame.vertices - np.array([0.0, 0.0, frame.floor_z]) for frame in (before, after))
     ball = BALL * run.manifest.middle_length_m
-    found = cast(one, other, tiers, thickness=run.manifest.sphere_diameter_m, ball=ball)
+    width = mean_width(run.manifest.thickness_normal_m, run.manifest.thickness_in_plane_m)
+    found = cast(one, other, tiers, thickness=width, ball=ball)
     volumes = np.array([tier.volume for tier in tiers])
     filled = found.filled_before * volumes
     # A filled volume smaller than the ball that separates inside from outside is not meaningful.

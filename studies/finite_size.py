@@ -19,6 +19,7 @@ from dem.errors import InputError
 from dem.record.frames import FrameSequence
 from dem.record.run import Run
 from postprocess.measures.clusters import entanglement_clusters, spans_height, spans_width
+from postprocess.measures.contacts import chain_of
 from postprocess.measures.entanglement import entanglement
 from postprocess.measures.packing import packing_of
 from postprocess.measures.spread import escaped
@@ -142,10 +143,10 @@ def _at_rest(run: Run, frames: FrameSequence, stage: str, phase: int) -> dict[st
     if not part:
         raise InputError(f"{run.path}: no frame of phase {phase} (relax); run it again")
     frame = part[-1]
-    vertices, diameter = frame.vertices, run.manifest.sphere_diameter_m
+    vertices, chain = frame.vertices, chain_of(run)
     clusters = entanglement_clusters(vertices)
-    height = spans_height(clusters, vertices, diameter=diameter, floor_z=frame.floor_z)
-    width = spans_width(clusters, vertices, diameter=diameter, wall_radius=run.manifest.container_radius_m)
+    height = spans_height(clusters, vertices, chain=chain, floor_z=frame.floor_z)
+    width = spans_width(clusters, vertices, chain=chain, wall_radius=run.manifest.container_radius_m)
     return {
         **{phi(stage, one): packing_of(frame, run, definition=one) for one in DEFINITIONS},
         crossings(stage): entanglement(vertices).mean,

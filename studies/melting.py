@@ -242,7 +242,7 @@ STUDY = Study(
     ),
     order=(LIFT, ASPECT, SEED, PROCEDURE),
     remarks=(
-        f"Clusters: centrelines within {TOUCHING:g} sphere diameters, or links through planes. Sloughed: farther from "
+        f"Clusters: strands within {TOUCHING:g} diameters, or links through planes. Sloughed: farther from "
         f"the pile's middle (median) than the wall was, by {OUTSIDE:g} w. Numbers are those at the end of the run.",
     ),
     pictured={"procedure": SHAPE, "lift_m_per_s": 0, "l_over_w": 0.7},

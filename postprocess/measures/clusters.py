@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.links import Flags, UndefinedMeasureError, Vertices, Whole, checked_vertices
-from postprocess.measures.contacts import at_wall, contact_pairs, on_floor, pairs_in_contact
+from postprocess.geometry.links import Chain, Flags, UndefinedMeasureError, Vertices, Whole, checked_vertices
+from postprocess.measures.contacts import at_wall, chain_of, on_floor, pairs_in_contact, pairs_of_strands
 from postprocess.measures.entanglement import crossing_pairs
 from postprocess.measures.heights import material_height
 from postprocess.measures.registry import FrameMeasure, Quantity, in_one_cylinder
@@ -29,10 +29,11 @@ class Clusters:
         return float(self.sizes[0] / len(self.labels))
 
 
-def contact_clusters(vertices: Vertices, distance: float) -> Clusters:
-    """Find clusters of smarticles whose centrelines are at most a distance [m] apart."""
-    pairs = contact_pairs(vertices, distance)
-    return joined_clusters(len(checked_vertices(vertices)), pairs.i, pairs.j)
+def contact_clusters(vertices: Vertices, chain: Chain, distance: float) -> Clusters:
+    """Find clusters of smarticles of which two strands' axes are at most a distance [m] apart."""
+    vertices = checked_vertices(vertices)
+    pairs = pairs_of_strands(vertices, chain, distance)
+    return joined_clusters(len(vertices), pairs.i, pairs.j)
 
 
 def entanglement_clusters(vertices: Vertices) -> Clusters:
@@ -47,11 +48,11 @@ def contact_graph(frame: Frame, run: Run) -> Clusters:
     return joined_clusters(frame.count, pairs.i, pairs.j)
 
 
-def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, floor_z: float) -> bool:
+def spans_height(clusters: Clusters, vertices: Vertices, *, chain: Chain, floor_z: float) -> bool:
     """Return whether one cluster reaches from the floor to the top of the pile.
 
-    Vertices (N, 4, 3), diameter of the spheres along the links, and height of the floor are in [m]. The top is the
-    height below which 95 % of the material lies.
+    Vertices (N, 4, 3) and height of the floor are in [m]; `chain` has the sizes of the strands. The top is the height
+    below which 95 % of the material lies.
 
     Source:
         Stauffer & Aharony, Introduction to Percolation Theory (1994), section 2: a cluster percolates if it joins
@@ -59,7 +60,7 @@ def spans_height(clusters: Clusters, vertices: Vertices, *, diameter: float, flo
     """
     vertices = checked_vertices(vertices)
     top = floor_z + material_height(vertices, floor_z=floor_z)
-    return spans(clusters, on_floor(vertices, diameter=diameter, floor_z=floor_z), vertices[..., 2].max(axis=1) >= top)
+    return spans(clusters, on_floor(vertices, chain=chain, floor_z=floor_z), vertices[..., 2].max(axis=1) >= top)
 
 
 def spans(clusters: Clusters, low: Flags, high: Flags) -> bool:
@@ -73,15 +74,14 @@ def spans(clusters: Clusters, low: Flags, high: Flags) -> bool:
     return bool(np.isin(clusters.labels[low], clusters.labels[high]).any())
 
 
-def spans_width(clusters: Clusters, vertices: Vertices, *, diameter: float, wall_radius: float) -> bool:
+def spans_width(clusters: Clusters, vertices: Vertices, *, chain: Chain, wall_radius: float) -> bool:
     """Return whether one cluster spans the container from one side of the round wall to the other.
 
     A cluster spans the container if its contacts with the wall do not all lie on one half of the wall. Vertices
-    (N, 4, 3), diameter of the spheres along the links, and radius of the wall are in [m]; the wall is centred at
-    x = y = 0.
+    (N, 4, 3) and radius of the wall are in [m]; the wall is centred at x = y = 0. `chain` has the sizes of the strands.
     """
     vertices = checked_vertices(vertices)
-    smarticle, vertex = np.nonzero(at_wall(vertices, diameter=diameter, wall_radius=wall_radius))
+    smarticle, vertex = np.nonzero(at_wall(vertices, chain=chain, wall_radius=wall_radius))
     azimuth = np.arctan2(vertices[smarticle, vertex, 1], vertices[smarticle, vertex, 0])
     for label in np.unique(clusters.labels[smarticle]):
         around = np.sort(azimuth[clusters.labels[smarticle] == label])
@@ -107,11 +107,11 @@ def joined_clusters(count: int, i: Whole, j: Whole) -> Clusters:
 
 
 def _spans_of(clusters: Clusters, frame: Frame, run: Run) -> tuple[float, float, float]:
-    vertices, diameter = frame.vertices, run.manifest.sphere_diameter_m
-    height = spans_height(clusters, vertices, diameter=diameter, floor_z=frame.floor_z)
+    vertices, chain = frame.vertices, chain_of(run)
+    height = spans_height(clusters, vertices, chain=chain, floor_z=frame.floor_z)
     # Without a wall there is no width to span.
     walled = run.manifest.walled(frame.phase)
-    width = walled and spans_width(clusters, vertices, diameter=diameter, wall_radius=run.manifest.container_radius_m)
+    width = walled and spans_width(clusters, vertices, chain=chain, wall_radius=run.manifest.container_radius_m)
     return clusters.largest, float(height), float(width) if walled else math.nan
 
 

@@ -24,7 +24,6 @@ from postprocess.geometry.links import (
     checked_vertices,
     spheres,
     strands,
-    swept_axes,
 )
 from postprocess.geometry.segments import close_segments, inner_axes
 from postprocess.measures.registry import FrameMeasure, Quantity, in_one_cylinder
@@ -81,9 +80,17 @@ def pairs_in_contact(frame: Frame, run: Run) -> ContactPairs:
     vertices, chain = checked_vertices(frame.vertices), chain_of(run)
     if chain.pitch > 0:
         return pairs_of_spheres(spheres(vertices, chain), chain.diameter)
-    each = strands(vertices, chain)
     # Recorded vertices are rounded, which would lose contacts of zero overlap.
-    pairs = contact_pairs(each.reshape(-1, 4, 3), chain.diameter * (1 + 1e-9))
+    return pairs_of_strands(vertices, chain, chain.diameter * (1 + 1e-9))
+
+
+def pairs_of_strands(vertices: Floats, chain: Chain, distance: float) -> ContactPairs:
+    """Find the pairs of N smarticles of which two strands' axes are at most `distance` [m] apart.
+
+    Vertices (N, 4, 3) are in [m]. Chains of spheres count as the strands that envelop them.
+    """
+    each = strands(vertices, chain)
+    pairs = contact_pairs(each.reshape(-1, 4, 3), distance)
     return _merged(pairs.i // chain.rows, pairs.j // chain.rows, pairs.distance, len(vertices))
 
 
@@ -213,7 +220,7 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 def without_support(
-    vertices: Vertices, contacts: ArrayLike, *, diameter: float, floor_z: float, wall_radius: float | None
+    vertices: Vertices, contacts: ArrayLike, *, chain: Chain, floor_z: float, wall_radius: float | None
 ) -> Flags:
     """Return which of N smarticles touch no other smarticle, no floor and no wall (rattlers): (N,) bool.
 
@@ -223,7 +230,7 @@ def without_support(
     Args:
         vertices: (N, 4, 3) [m].
         contacts: (N,) number of other smarticles that each smarticle touches, `Frame.contacts`.
-        diameter: Diameter of the spheres along the links [m].
+        chain: Sizes of the strands.
         floor_z: Height of the floor [m].
         wall_radius: Radius of the wall around the axis x = y = 0 [m]; None: there is no wall.
 
@@ -232,30 +239,31 @@ def without_support(
         number.
     """
     held = np.asarray(contacts) > 0
-    held |= on_floor(vertices, diameter=diameter, floor_z=floor_z)
+    held |= on_floor(vertices, chain=chain, floor_z=floor_z)
     if wall_radius is not None:
-        held |= at_wall(vertices, diameter=diameter, wall_radius=wall_radius).any(axis=1)
+        held |= at_wall(vertices, chain=chain, wall_radius=wall_radius).any(axis=1)
     return ~held
 
 
-def on_floor(vertices: Vertices, *, diameter: float, floor_z: float) -> Flags:
+def on_floor(vertices: Vertices, *, chain: Chain, floor_z: float) -> Flags:
     """Return which of N smarticles touch the floor: (N,) bool.
 
-    `diameter` is that of the spheres along the links, `floor_z` the height of the floor [m].
+    `chain` has the sizes of their strands, `floor_z` is the height of the floor [m].
     """
-    axes = swept_axes(checked_vertices(vertices), diameter)
-    touching: Flags = axes[..., 2].min(axis=1) - floor_z <= _REACH * diameter / 2
+    axes = strands(checked_vertices(vertices), chain)
+    touching: Flags = axes[..., 2].min(axis=(1, 2)) - floor_z <= _REACH * chain.diameter / 2
     return touching
 
 
-def at_wall(vertices: Vertices, *, diameter: float, wall_radius: float) -> Flags:
+def at_wall(vertices: Vertices, *, chain: Chain, wall_radius: float) -> Flags:
     """Return which vertices touch the wall: (N, 4) bool.
 
-    A straight link touches a round wall with its ends first. `diameter` is that of the spheres along the links,
-    `wall_radius` that of the wall around the axis x = y = 0 [m].
+    A straight link touches a round wall with its ends first. `chain` has the sizes of the strands, `wall_radius` is the
+    radius of the wall around the axis x = y = 0 [m].
     """
-    axes = swept_axes(checked_vertices(vertices), diameter)
-    touching: Flags = wall_radius - np.hypot(axes[..., 0], axes[..., 1]) <= _REACH * diameter / 2
+    axes = strands(checked_vertices(vertices), chain)
+    farthest = np.hypot(axes[..., 0], axes[..., 1]).max(axis=1)
+    touching: Flags = wall_radius - farthest <= _REACH * chain.diameter / 2
     return touching
 
 
@@ -263,7 +271,7 @@ def _rattlers_of(frame: Frame, run: Run) -> tuple[float]:
     loose = without_support(
         frame.vertices,
         frame.contacts,
-        diameter=run.manifest.sphere_diameter_m,
+        chain=chain_of(run),
         floor_z=frame.floor_z,
         wall_radius=run.manifest.container_radius_m if run.manifest.walled(frame.phase) else None,
     )

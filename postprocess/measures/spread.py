@@ -19,11 +19,12 @@ from postprocess.geometry.links import (
     link_lengths,
 )
 from postprocess.measures.clusters import contact_clusters, entanglement_clusters
+from postprocess.measures.contacts import chain_of
 from postprocess.measures.heights import least_reaching
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, any_in_space, in_space
 
 TOUCHING = 1.05
-"""Largest distance of two centrelines at which smarticles count as neighbours, over the diameter of the spheres [-].
+"""Largest distance of two strands' axes at which smarticles count as neighbours, over their diameter [-].
 
 The 5 % keep contacts that open and close while a pile settles. Neighbours need not touch: on YADE there are 1.4 times
 as many neighbours as touching pairs at rest after pouring, 1.9 to 2.1 times at rest after shaking, and 6 times while
@@ -58,11 +59,11 @@ def free_pile(
     The foot, x and y [m], is the point on which the pile stood, best the centre of mass before the wall was removed.
     """
     vertices = checked_vertices(vertices)
-    centre = centre_of_mass(vertices)
+    centre, chain = centre_of_mass(vertices), chain_of(run)
     # Outliers have little influence on medians.
     middle = np.median(centres_of_mass(vertices)[:, :2], axis=0)
     return FreePile(
-        touching=contact_clusters(vertices, TOUCHING * run.manifest.sphere_diameter_m).largest,
+        touching=contact_clusters(vertices, chain, TOUCHING * chain.diameter).largest,
         entangled=entanglement_clusters(vertices).largest,
         radius_half=spread_radius(vertices, share=0.5),
         radius_most=spread_radius(vertices, share=0.95),

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from dem.body.particle import HINGE_CLEARANCE, INWARDS, Boxes, Particle, SphereChain
 from postprocess import contact_pairs
 from postprocess.geometry import links
+from postprocess.geometry.links import Chain
 from postprocess.measures.contacts import chain_of, pairs_of_spheres, segment_distances, without_support
 
 
@@ -50,7 +51,7 @@ def test_a_rattler_touches_neither_others_nor_floor_nor_wall(shape):
     line, d = shape(0.01, 0.7, (0.0, 0.0)), 1e-3
     places = np.array([[0, 0, 0.5 * d], [0, 0, 0.6 * d], [0.0075, 0, 0.01], [0.0077, 0, 0.01], [0, 0, 0.01]])
     pile = line + places[:, None]
-    sizes = {"diameter": d, "floor_z": 0.0}
+    sizes = {"chain": Chain(diameter=d, rows=1, width=d, pitch=0.0), "floor_z": 0.0}
     # A tip is 12 mm from the middle: it touches a wall of 20 mm where the middle is 8 mm, less what facets take, out.
     assert without_support(pile, [0] * 5, wall_radius=0.02, **sizes).tolist() == [False, True, True, True, True]
     assert without_support(pile, [0] * 5, wall_radius=0.0195, **sizes).tolist() == [False, True, False, False, True]
@@ -59,6 +60,18 @@ def test_a_rattler_touches_neither_others_nor_floor_nor_wall(shape):
     assert not without_support(pile - np.array([0, 0, 0.1]), [0] * 5, wall_radius=None, **sizes).any()
     loose = without_support(pile, [0, 1, 0, 2, 0], wall_radius=None, **sizes)
     assert loose.tolist() == [False, False, True, False, True]
+
+
+def test_a_smarticle_of_two_strands_on_its_edge_is_held_by_the_floor_and_the_wall(shape):
+    u, d = shape(0.01, 0.7), 0.5e-3
+    chain = Chain(diameter=d, rows=2, width=1.3e-3, pitch=0.0)
+    # Its normal is along z: the lower strand touches what the middle of the bar is 0.65 mm away from.
+    for height, loose in ((0.65e-3, False), (0.72e-3, True)):
+        pile = np.array([u + np.array([0, 0, height])])
+        assert without_support(pile, [0], chain=chain, floor_z=0.0, wall_radius=None).tolist() == [loose]
+    upright = u[:, [2, 0, 1]] + np.array([0.02 - 0.65e-3, 0, 0.05])  # its normal is along x, towards the wall
+    assert not without_support(upright[None], [0], chain=chain, floor_z=0.0, wall_radius=0.0205).any()
+    assert without_support(upright[None], [0], chain=chain, floor_z=0.0, wall_radius=0.0212).all()
 
 
 # -- what engines see ------------------------------------------------------------------------------------------------

@@ -19,7 +19,8 @@ from postprocess.measures.spread import (
 )
 
 W = 0.0117
-RUN = SimpleNamespace(manifest=SimpleNamespace(sphere_diameter_m=1.2e-3, container_radius_m=0.0234, middle_length_m=W))
+SIZES = {"container_radius_m": 0.0234, "middle_length_m": W, "thickness_normal_m": 1.2e-3, "bulge_m": 0.0}
+RUN = SimpleNamespace(scene={}, manifest=SimpleNamespace(sphere_diameter_m=1.2e-3, engine="links", **SIZES))
 
 
 def line(start, end):
@@ -90,3 +91,15 @@ def test_what_lies_beyond_the_former_wall_came_off():
     assert free_pile(pile + np.array([0.1, 0.05, 0.0]), RUN).sloughed == 0.25
     assert (found.touching, found.entangled) == (0.25, 0.25)
     assert found.radius_half < found.radius_most
+
+
+@pytest.mark.parametrize(("rows", "diameter"), [(1, 1.2e-3), (2, 0.5e-3)])
+def test_links_that_touch_by_their_strands_are_one_cluster(rows, diameter):
+    fidelity = {"rows": rows, "pitch": 1.0}
+    run = SimpleNamespace(
+        scene={"fidelity": fidelity}, manifest=SimpleNamespace(sphere_diameter_m=diameter, engine="links", **SIZES)
+    )
+    # Both are U-shapes with their normals along z, one upon the other: bars of 1.2 mm touch, whatever their strands.
+    u = np.array([[-W / 2, W / 2, 0], [-W / 2, 0, 0], [W / 2, 0, 0], [W / 2, W / 2, 0]])
+    for gap, cluster in ((1.2e-3, 1.0), (1.3e-3, 0.5)):
+        assert free_pile(np.array([u, u + np.array([0, 0, gap])]), run).touching == cluster
