@@ -229,7 +229,7 @@ def _complete(runs: pd.DataFrame) -> pd.DataFrame:
     Tables of earlier versions of the study lack φ_f at rest, and the column `CONTACT`: their contact is `PAPER`.
     """
     runs = runs.reindex(columns=[*runs.columns, *(name for name in QUANTITIES if name not in runs)])
-    return runs if CONTACT in runs else runs.assign(**{CONTACT: PAPER})
+    return runs.assign(**{CONTACT: runs[CONTACT].fillna(PAPER) if CONTACT in runs else PAPER})
 
 
 def _fully_shaken(points: pd.DataFrame) -> pd.DataFrame:
