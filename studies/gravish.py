@@ -322,7 +322,7 @@ STUDY = Study(
         name: by_engine(_fully_shaken(_complete(runs)), partial(_each_contact, made=made))
         for name, made in (("deviations", deviations), ("steps", steps))
     },
-    order=(CONTACT, ASPECT, SEED),
+    order=(ASPECT, SEED),
     from_tables=True,
     remarks=(
         f"φ by {DEFINITION} unless named otherwise; {WHEN} (voxel and voronoi: the last frame, voronoi not of drafts). "

@@ -93,7 +93,11 @@ def test_a_study_is_analysed_from_the_wheel(smarticles: Callable[..., str], tmp_
     folder = make_folder(shipped("gravish").sweep_file(quick=True), out, "test")
     for entry in [one for one in folder.entries if not one.again and one.values["l_over_w"] == 0.7]:
         shake = SyntheticRun(
-            aspect_ratio=entry.values["l_over_w"], seed=entry.values["seed"], count=6, frames_per_phase=1
+            aspect_ratio=entry.values["l_over_w"],
+            seed=entry.values["seed"],
+            count=6,
+            frames_per_phase=1,
+            friction=0.4,
         )
         manifest = write_run(folder.run(entry), shake) / "run.json"
         content = {**json.loads(manifest.read_text()), "scene_sha256": entry.scene_sha256}

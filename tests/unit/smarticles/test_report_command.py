@@ -196,7 +196,7 @@ def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: Write
     *finished, last = folder.entries
     for entry in finished:
         known = {"aspect_ratio": entry.values["l_over_w"], "seed": entry.values["seed"]}
-        made = write_run(folder.run(entry), count=6, frames_per_phase=1, **known) / "run.json"
+        made = write_run(folder.run(entry), count=6, frames_per_phase=1, friction=0.4, **known) / "run.json"
         facts = {"scene_sha256": entry.scene_sha256, "engine": entry.values["engine"]}
         made.write_text(json.dumps(json.loads(made.read_text(encoding="utf-8")) | facts), encoding="utf-8")
     # What remains fails before an engine is needed.

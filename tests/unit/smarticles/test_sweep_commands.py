@@ -167,6 +167,6 @@ def test_a_sweep_runs_on_the_engine_that_is_asked_for(sweep_file: Path, tmp_path
     assert said.status == 2
     assert "constants: there is no 'engine' that could be links; add `engine: yade` there, and" in said.err
     said = smarticles("sweep", shipped("gravish").sweep_file(), "--engine", "links", "--dry-run")
-    assert said.out.splitlines()[-1].startswith("64 runs, ")
+    assert said.out.splitlines()[-1].startswith("128 runs, ")
     said = smarticles("sweep", shipped("gravish").sweep_file(), "--engine", "yode", "--dry-run")
     assert "--engine: 'yode' is not known; did you mean 'yade'?" in said.err
