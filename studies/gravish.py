@@ -256,7 +256,7 @@ def _by_contact(table: pd.DataFrame) -> list[Series]:
     looks = [procedure_marker(EXTERNAL), marker("s", style.BLACK, style.BLACK)]
     contacts = sorted(table[CONTACT].unique(), key=lambda one: (one != PAPER, one))
     return [
-        Series(rows=table[table[CONTACT] == one], label=str(one), properties=look)
+        Series(rows=table[table[CONTACT] == one], label=str(one).split(", restitution")[0], properties=look)
         for one, look in zip(contacts, looks, strict=False)
     ]
 
@@ -295,7 +295,7 @@ STUDY = Study(
             rows=_at_rest,
             split=_by_contact,
             share_y=True,
-            published="experiment (Gravish 2012)",
+            published="experiment",
             reference={
                 phi(stage): (_PUBLISHED["l_over_w"], _PUBLISHED[GRAVISH_COLUMNS[stage]]) for stage in ("phi_0", "phi_f")
             },

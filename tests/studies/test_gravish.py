@@ -100,8 +100,10 @@ def test_the_figure_shows_fully_shaken_piles_at_rest_for_each_contact() -> None:
         runs[name.column] = runs.get(name.column, np.nan)
     figure = next(one for one in STUDY.figures if one.name == "phi")
     drawn = figure.split(figure.rows(STUDY.points(runs)))  # type: ignore[attr-defined]
-    assert [one.label for one in drawn] == [PAPER, OTHER]
-    values = {one.label: one.rows.set_index(ASPECT)[[phi("phi_0"), phi("phi_f")]].round(4) for one in drawn}
+    assert [one.label for one in drawn] == [PAPER, "friction 0.5, 1 at the container"]
+    values = {
+        one.rows[CONTACT].iloc[0]: one.rows.set_index(ASPECT)[[phi("phi_0"), phi("phi_f")]].round(4) for one in drawn
+    }
     assert values[PAPER].loc[0.7].tolist() == [0.1155, 0.143]
     assert values[OTHER].loc[0.7].tolist() == pytest.approx([0.1040, 0.1287], abs=1e-4)
     assert values[PAPER].loc[0.4].isna().tolist() == [False, True]  # shaken for 1.5 s beside 20 s
@@ -140,4 +142,4 @@ def test_figures_of_a_quick_study_say_what_the_full_study_found(tmp_path: Path) 
     for name in ("phi", "crossings", "phi_time"):
         texts = re.findall(r"<text[^>]*>([^<]*)</text>", report.files[f"{name}.svg"].read_text(encoding="utf-8"))
         assert f"Not the full study, which found: {full}" in " ".join(texts)
-        assert {"phi": "experiment (Gravish 2012)", "crossings": "0.40", "phi_time": "l/w = 0.7"}[name] in texts
+        assert {"phi": "experiment", "crossings": "0.40", "phi_time": "l/w = 0.7"}[name] in texts
