@@ -93,16 +93,6 @@ def contact_text(run: Run) -> str:
     return f"friction {between:.3g}, {wall:.3g} at the container, restitution {restitution:.3g}"
 
 
-def _with_paper(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs with the contact of Savoie et al.; all runs of a table without the column `CONTACT`."""
-    return runs[runs[CONTACT] == PAPER] if CONTACT in runs else runs
-
-
-def _with_others(runs: pd.DataFrame) -> pd.DataFrame:
-    """Return the runs with another contact than that of Savoie et al."""
-    return runs[runs[CONTACT] != PAPER] if CONTACT in runs else runs.iloc[:0]
-
-
 def phi_by_aspect(runs: pd.DataFrame, stage: str) -> Mapping[float, SeedMean]:
     """Return the mean φ over seeds at a stage by l/w, in ascending order; empty if it was not measured."""
     if phi(stage) not in runs:  # tables of earlier versions
@@ -156,7 +146,7 @@ def falls(end: str) -> Finding:
     """Make the finding that φ_0 (`end` is "phi_0") or φ_f ("phi_f") falls monotonically with l/w."""
 
     def outcome(every: pd.DataFrame) -> Outcome:
-        runs = _with_paper(every)
+        runs = _of_contact(every)
         stage = compared(runs, end)
         means = list(phi_by_aspect(runs, stage).items())
         if len(means) < 2:
@@ -187,7 +177,7 @@ def near(end: str, *, calibrated: bool = False) -> Finding:
     """
 
     def outcome(every: pd.DataFrame) -> Outcome:
-        runs = _with_others(every) if calibrated else _with_paper(every)
+        runs = _of_contact(every, paper=not calibrated)
         found, stage = deviations(runs), compared(runs, end)
         found = found[found["stage"] == stage] if len(found) else found
         if found.empty:
@@ -214,7 +204,7 @@ def near(end: str, *, calibrated: bool = False) -> Finding:
 
 
 def _compacts(every: pd.DataFrame) -> Outcome:
-    runs = _with_paper(every)
+    runs = _of_contact(every)
     gain = runs[phi(compared(runs, "phi_f"))] - runs[phi("phi_0")]
     means = [mean_over_seeds(part) for _, part in gain.groupby(runs[ASPECT])]
     clear = sum(mean.value > mean.half_width for mean in means)
@@ -230,6 +220,12 @@ def _complete(runs: pd.DataFrame) -> pd.DataFrame:
     """
     runs = runs.reindex(columns=[*runs.columns, *(name for name in QUANTITIES if name not in runs)])
     return runs.assign(**{CONTACT: runs[CONTACT].fillna(PAPER) if CONTACT in runs else PAPER})
+
+
+def _of_contact(runs: pd.DataFrame, *, paper: bool = True) -> pd.DataFrame:
+    """Return the runs with the contact of Savoie et al., or unless `paper` all others."""
+    runs = _complete(runs)
+    return runs[(runs[CONTACT] == PAPER) == paper]
 
 
 def _fully_shaken(points: pd.DataFrame) -> pd.DataFrame:
@@ -252,12 +248,16 @@ def _at_rest(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def _by_contact(table: pd.DataFrame) -> list[Series]:
-    """Return a series for each contact, that of Savoie et al. first."""
-    looks = [procedure_marker(EXTERNAL), marker("s", style.BLACK, style.BLACK)]
+    """Return a series for each contact, that of Savoie et al. first; labels leave the restitution out."""
     contacts = sorted(table[CONTACT].unique(), key=lambda one: (one != PAPER, one))
+    other = marker("s", style.BLACK, style.BLACK)
     return [
-        Series(rows=table[table[CONTACT] == one], label=str(one).split(", restitution")[0], properties=look)
-        for one, look in zip(contacts, looks, strict=False)
+        Series(
+            rows=table[table[CONTACT] == one],
+            label=str(one).split(", restitution")[0],
+            properties=procedure_marker(EXTERNAL) if one == PAPER else other,
+        )
+        for one in contacts
     ]
 
 
