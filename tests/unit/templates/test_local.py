@@ -148,7 +148,7 @@ def test_ctrl_c_stops_all_runs_and_leaves_usable_directories(folder: Folder) -> 
     watcher = Watcher(when=lambda now: sum(said.phi is not None for *_, said in now.running) == 2)
     with pytest.raises(KeyboardInterrupt):
         run_folder(folder, watcher, slots=2, command=fake(waiting), **QUICK)
-    assert watcher.starts == ["n20_seed1", "n20_seed2"]
+    assert sorted(watcher.starts) == ["n20_seed1", "n20_seed2"]  # two threads, in either order
     assert watcher.stops == [2]
     assert sorted(statuses(watcher.ends)) == ["interrupted", "interrupted"]
     assert not watcher.open
