@@ -51,7 +51,7 @@ from postprocess.measures.nematic import (
 )
 from postprocess.measures.packing import DEFINITIONS, PackingFraction, packing_fraction
 from postprocess.measures.profile import PackingProfile, packing_profile, profile_table
-from postprocess.measures.table import PackingChange, measure_run, packing_change, summarise_run
+from postprocess.measures.table import measure_run, summarise_run
 from postprocess.report.tables import write_table
 from postprocess.statistics.seeds import Mean, mean_with_error
 
@@ -70,7 +70,6 @@ __all__ = [
     "LinkLifetimes",
     "Mean",
     "NematicOrder",
-    "PackingChange",
     "PackingFraction",
     "PackingProfile",
     "PolarOrder",
@@ -104,7 +103,6 @@ __all__ = [
     "nematic_order",
     "open_run",
     "opening_directions",
-    "packing_change",
     "packing_fraction",
     "packing_profile",
     "pairs_in_contact",

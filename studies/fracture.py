@@ -145,7 +145,7 @@ def measure(run: Run) -> Row:
         BEFORE: pull.before / total,
         ACCOUNT: pull.work / pull.engine_work - 1 if pull.engine_work else math.nan,
         RESIDUAL: pull.residual,
-        HELD_FAST: float(held_fast(pull, asked)),
+        HELD_FAST: float(held_fast(pull.raised, asked)),
         LIMIT: math.inf if unlimited else asked["force_limit_N"] / run.manifest.count / one,
         "escaped at the end [-]": table["escaped [-]"].iloc[-1],
         "frames averaged [-]": int(before["frames averaged"]),

@@ -151,7 +151,7 @@ def measure(run: Run) -> Row:
         BEYOND: highest.force / total - above,
         RAISED: highest.raised,
         WORK: pull.work / total / width,
-        HELD_FAST: float(held_fast(pull, settings)),
+        HELD_FAST: float(held_fast(pull.raised, settings)),
         "escaped at the end [-]": before["escaped [-]"],
         "frames averaged [-]": int(before["frames averaged"]),
         **last_columns(run),

@@ -126,18 +126,18 @@ def _number(row: Mapping[str, object], column: str) -> float:
     return float(str(row.get(column, math.nan)))
 
 
-def chosen(path: Path = CELLS) -> dict[str, Chosen]:
+def chosen() -> dict[str, Chosen]:
     """Read the cells that are computed anew, by table."""
-    return {table: Chosen(table=table, **entry) for table, entry in _listed(path)["cells"].items()}
+    return {table: Chosen(table=table, **entry) for table, entry in _listed()["cells"].items()}
 
 
-def left_out(path: Path = CELLS) -> dict[str, str]:
+def left_out() -> dict[str, str]:
     """Read the reasons for which tables are left out, by table."""
-    return dict(_listed(path)["left_out"])
+    return dict(_listed()["left_out"])
 
 
-def _listed(path: Path) -> dict[str, Any]:
-    listed: dict[str, Any] = yaml.safe_load(path.read_text(encoding="utf-8"))
+def _listed() -> dict[str, Any]:
+    listed: dict[str, Any] = yaml.safe_load(CELLS.read_text(encoding="utf-8"))
     return listed
 
 
@@ -165,21 +165,18 @@ def scene_of(one: Chosen) -> Scene:
     return point.scene
 
 
-def cell_of(one: Chosen, run: str | None = None) -> Cell:
-    """Return the published numbers of all seeds of the point of a run; InputError if seeds are too few.
-
-    `run` is any run of the table; None: the chosen one.
-    """
-    run, rows, points = run or one.run, published(one.table), points_of(one)
-    alike = {name: value for name, value in points[run].values.items() if name not in _NUMBERED}
+def cell_of(one: Chosen) -> Cell:
+    """Return the published numbers of all seeds of the point of a chosen run; InputError if seeds are too few."""
+    rows, points = published(one.table), points_of(one)
+    alike = {name: value for name, value in points[one.run].values.items() if name not in _NUMBERED}
     seeds = [
         name
         for name, point in points.items()
         if name in rows.index and {key: point.values[key] for key in alike} == alike
     ]
     if len(seeds) < FEWEST:
-        raise InputError(f"results/{one.table}: {len(seeds)} seeds of the point of {run}; choose one with {FEWEST}")
-    return Cell(table=one.table, run=run, rows=rows.loc[seeds].select_dtypes("number").drop(columns=[SEED]))
+        raise InputError(f"results/{one.table}: {len(seeds)} seeds of the point of {one.run}; choose one with {FEWEST}")
+    return Cell(table=one.table, run=one.run, rows=rows.loc[seeds].select_dtypes("number").drop(columns=[SEED]))
 
 
 def compute(scene: Scene, out: Path) -> Path:

@@ -123,7 +123,7 @@ def measure(run: Run) -> Row:
         RAISED: highest.raised,
         WORK: pull.work / weight / run.manifest.middle_length_m,
         BEFORE: pull.before / weight,
-        HELD_FAST: float(held_fast(pull, run.scene["phases"][-1])),
+        HELD_FAST: float(held_fast(pull.raised, run.scene["phases"][-1])),
         CHAINS: chains_between(torn, grid, hook + highest.raised) if run.forces is not None else math.nan,
         **last_columns(run),
     }

@@ -125,7 +125,7 @@ def measure(run: Run) -> Row:
     walled, before, torn = (phase[-1] for phase in phases)
     upper = hooks["upper_height_m"]
     pull = read_pull(run, run.series, pulled.index)
-    weight, highest, held = run.manifest.count * weight_of_one(run), peak(pull), held_fast(pull, settings)
+    weight, highest, held = run.manifest.count * weight_of_one(run), peak(pull), held_fast(pull.raised, settings)
     limit = settings.get("force_limit_N")
     centres = centres_of_mass(before.vertices)[:, 2]
     level = heights(before.vertices, floor_z=before.floor_z)

@@ -12,8 +12,7 @@ from postprocess.geometry.links import Floats, Whole, centres_of_mass
 def centres_of_bodies(segments: Floats, body: Whole) -> Floats:
     """Return the centres of mass (N, 3) [m] of bodies; all segments of a body have equal cross-sections.
 
-    Both ends of all segments are (M, 2, 3) [m]; `body` (M,) are indices of their bodies: ascending, from 0, without
-    gaps.
+    Both ends of all segments are (M, 2, 3) [m]; `body` (M,) are indices of their bodies, from 0, without gaps.
     """
     lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
     total = np.bincount(body, lengths)

@@ -169,7 +169,7 @@ def polygon_crossings(segments: ArrayLike, body: ArrayLike) -> PolygonCrossings:
     """
     segments, body = checked_segments(segments, body)
     found = curves(segments, body)
-    flaws = tuple(_flaw(one) for one in found)
+    flaws = tuple(polygon_flaw(one) for one in found)
     if all(flaws):
         first = f"body {found[0].body} {flaws[0]}" if found else "there is no body"
         raise UndefinedMeasureError(
@@ -213,12 +213,7 @@ def has_plane(vertices: Vertices) -> Flags:
     return bent
 
 
-def spans_polygon(curve: Curve) -> bool:
-    """Return whether a body spans a polygon: its segments are one curve, bent or closed, and flat."""
-    return not _flaw(curve)
-
-
-def _flaw(curve: Curve) -> str:
+def polygon_flaw(curve: Curve) -> str:
     """Return the reason why a body spans no polygon; empty if it spans one."""
     if curve.flaw:
         return curve.flaw

@@ -14,7 +14,7 @@ import numpy as np
 from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.geometry.links import Floats
-from postprocess.measures.pull import END, averaged, held_fast_of, interval_of, weight_of_one
+from postprocess.measures.pull import END, averaged, held_fast, interval_of, weight_of_one
 from postprocess.measures.registry import PhaseMeasure, Quantity, Shown
 
 TENSION, LIFT = "tension", "lift"  #: Types of phases
@@ -67,7 +67,7 @@ def _of_tension(run: Run, series: Series, phase: int) -> tuple[float, ...]:
         float(places[highest]) / test.length,
         float(held[highest]) / whole,
         test.work,
-        float(held_fast_of(test.elongations, asked)) if ended else float("nan"),
+        float(held_fast(test.elongations, asked)) if ended else float("nan"),
     )
 
 

@@ -13,9 +13,10 @@ from numpy.typing import ArrayLike
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.links import Floats, UndefinedMeasureError, Whole, checked_vertices
+from postprocess.geometry.bars import centres_of_bodies
+from postprocess.geometry.links import Floats, UndefinedMeasureError, checked_vertices
 from postprocess.geometry.segments import Curve, checked_curves, checked_segments, curves, segments_of
-from postprocess.measures.entanglement import spans_polygon
+from postprocess.measures.entanglement import polygon_flaw
 from postprocess.measures.registry import FrameMeasure, Quantity, any_in_space, in_space
 
 
@@ -123,8 +124,8 @@ def body_axes(segments: ArrayLike, body: ArrayLike, *, longest: bool = True) -> 
     """
     segments, body = checked_segments(segments, body)
     bodies, number = np.unique(body, return_inverse=True)
-    middle, lengths = segments.mean(axis=1), np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
-    centred = segments - _centres(middle, lengths, number)[number, None]
+    lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    centred = segments - centres_of_bodies(segments, number)[number, None]
     # Exact second moments of line segments: their ends and their middles weigh 1 : 1 : 4.
     points = np.stack([centred[:, 0], centred[:, 1], 2 * centred.mean(axis=1)], axis=1)
     moments = np.zeros((len(bodies), 3, 3))
@@ -173,13 +174,6 @@ def _opening(curve: Curve) -> tuple[Floats, str]:
     return opening / size, ""
 
 
-def _centres(middles: Floats, lengths: Floats, number: Whole) -> Floats:
-    """Return centres of mass (B, 3) [m] by middles (M, 3), lengths (M,) and body numbers (M,) of segments."""
-    sums, total = np.zeros((int(number.max(initial=-1)) + 1, 3)), np.bincount(number, lengths)
-    np.add.at(sums, number, lengths[:, None] * middles)
-    return sums / total[:, None]
-
-
 def _unit(directions: ArrayLike) -> Floats:
     """Return unit vectors (N, 3) of directions after checking these."""
     directions = np.asarray(directions, dtype=np.float64)
@@ -201,7 +195,7 @@ def _nematic_of(frame: Frame, _: Run) -> tuple[float, float, float]:
 
 def _orientation_of(frame: Frame, _: Run) -> tuple[float, float, float]:
     segments, body = segments_of(frame)
-    bent = [one for one in curves(segments, body) if spans_polygon(one)]
+    bent = [one for one in curves(segments, body) if not polygon_flaw(one)]
     mouths = np.array([direction for direction, flaw in map(_opening, bent) if not flaw])
     polar = polar_order(mouths) if len(mouths) else PolarOrder(vector=np.full(3, np.nan), order=math.nan)
     return segment_order(segments, body).order, polar.order, float(polar.vector[2])

@@ -163,16 +163,11 @@ def freed(pull: HookPull) -> float:
     return float(times[held[-1] + 1])
 
 
-def held_fast(pull: HookPull, asked: SceneData) -> bool:
-    """Return whether the force limit stopped the hook of a finished pull.
+def held_fast(ways: Floats, asked: SceneData) -> bool:
+    """Return whether a force limit stopped the hook or grip that has moved by `ways` (n,) [m] in a finished phase.
 
     The peak force is then a lower bound. `asked` is the scene's entry for this phase.
     """
-    return held_fast_of(pull.raised, asked)
-
-
-def held_fast_of(ways: Floats, asked: SceneData) -> bool:
-    """Return whether a force limit stopped what has moved by `ways` (n,) [m] in a finished phase, see `held_fast`."""
     if asked.get("force_limit_N") is None:
         return False  # nothing else stops it
     # The last sample may be one interval before the arrival.
@@ -193,7 +188,7 @@ def _pull_of(run: Run, series: Series, phase: int) -> tuple[float, ...]:
         freed(pull),
         pull.left / weight,
         float(pull.raised[-1]),
-        float(held_fast(pull, run.scene["phases"][phase])) if ended else math.nan,
+        float(held_fast(pull.raised, run.scene["phases"][phase])) if ended else math.nan,
     )
 
 

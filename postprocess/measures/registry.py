@@ -2,7 +2,7 @@
 
 Each module lists its measures in a tuple `MEASURES`. A measure has a name, a function of a frame or of a phase, and the
 columns that this function fills, with units. Tables and `smarticles measure` read the registry, so that a new measure
-needs its module, a test, and a line in README.
+needs its module and a test.
 """
 
 import pkgutil

@@ -86,18 +86,16 @@ def centre_of_mass(vertices: Vertices) -> Floats:
     return centre
 
 
-def spread_radius(vertices: Vertices, *, share: float, axis: tuple[float, float] | None = None) -> float:
-    """Return the radius [m] around a vertical axis that holds a fraction of the material.
+def spread_radius(vertices: Vertices, *, share: float) -> float:
+    """Return the radius [m] around the vertical axis through the centre of mass that holds a fraction of the material.
 
     The material is spread evenly along each link's centreline. The part of each centreline inside a circle, seen from
-    above, is exact; the radius is found by bisection. The axis, x and y [m], passes through the pile's centre of mass
-    if not given. InputError unless the fraction `share` is above 0 and up to 1.
+    above, is exact; the radius is found by bisection. InputError unless the fraction `share` is above 0 and up to 1.
     """
     vertices = checked_vertices(vertices)
     if not 0 < share <= 1:
         raise InputError(f"share must be above 0 and up to 1 of the material: got {share}; 0.95 is usual")
-    centre = centre_of_mass(vertices)[:2] if axis is None else np.asarray(axis)
-    points = vertices[:, :, :2] - centre
+    points = vertices[:, :, :2] - centre_of_mass(vertices)[:2]
     start, along = points[:, :-1].reshape(-1, 2), np.diff(points, axis=1).reshape(-1, 2)
     weights = link_lengths(vertices).ravel()
     level = share * weights.sum()

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 import pandas as pd
@@ -12,10 +11,10 @@ from dem.record.columns import EVERY
 from dem.record.frames import FrameSequence
 from dem.record.run import Run
 from dem.record.series import Series
-from postprocess.measures.packing import DEFINITIONS, packing_of
+from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.registry import FrameMeasure, frame_measures, phase_measures
 from postprocess.statistics.points import ASPECT, SEED, marked
-from postprocess.statistics.seeds import Mean, mean_with_error
+from postprocess.statistics.seeds import mean_with_error
 
 Costly = Literal["never", "phase-end", "every-frame"]  #: Frames for which costly measures are computed
 
@@ -26,15 +25,6 @@ _LABELS = ("run", "name", SEED, ASPECT, "count", "fidelity", "scene_sha256")
 _COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
 # Left out, because the table computes these from the frames.
 _SERIES_MEASURED = frozenset({"time_s", "phase", "count", "com_height_m", "packing_fraction"})
-
-
-@dataclass(frozen=True, kw_only=True)
-class PackingChange:
-    """Packing fraction of a run before its first activity and at the end of its last activity."""
-
-    before: Mean  #: φ_0, mean over the last frames of the phase before the first activity [-]
-    after: Mean  #: φ_f, mean over the last frames of the last activity [-]
-    definition: str  #: Key of `packing.DEFINITIONS`
 
 
 def measure_run(
@@ -98,7 +88,8 @@ def summarise_run(
     Raises:
         InputError: Unknown definition or name, `last` below 1, or a file is missing or damaged.
     """
-    _check_last(last)
+    if last < 1:
+        raise InputError(f"last must be 1 frame or more: got {last}; {LAST_FRAMES} is usual")
     frames, series = _open(run, definitions)
     summaries = []
     for part in _frames_by_phase(run, frames):
@@ -116,52 +107,6 @@ def summarise_run(
                 summary |= measure.columns(run, series, part[0].phase)
         summaries.append(summary)
     return pd.DataFrame(summaries)
-
-
-def packing_change(
-    run: Run,
-    *,
-    definition: str = "second-highest-com",
-    last: int = LAST_FRAMES,
-    activity: Collection[str] | None = None,
-) -> PackingChange:
-    """Compute the packing fractions φ_0 and φ_f of a run, before and after its activity.
-
-    Args:
-        definition: Key of `packing.DEFINITIONS`.
-        last: Number of frames to average; a phase with fewer frames is averaged over all its frames.
-        activity: Types of phase that count as activity; if not given, all phases that are not at rest.
-
-    Raises:
-        InputError: The run has no activity, or no frame of it yet, or a file is missing or damaged.
-
-    Source:
-        changeInPhiAmp.m of wsavoie/SmarticleSim: means over 20 samples.
-    """
-    _check_last(last)
-    frames, _ = _open(run, [definition])
-    active = [
-        phase.index for phase in run.phases if (not phase.at_rest if activity is None else phase.type in activity)
-    ]
-    if not active or active[0] == 0:
-        types = ", ".join(phase.type for phase in run.phases)
-        raise InputError(
-            f"run {run} has no activity with a phase before it: its phases are {types}; "
-            f"name its types of activity or choose another run"
-        )
-    means = []
-    for phase in (active[0] - 1, active[-1]):
-        part = frames.in_phase(phase)[-last:]
-        if not part:
-            kind = run.phases[phase].type
-            raise InputError(f"run {run} has no frame of phase {phase} ({kind}) yet; wait or resume it")
-        means.append(mean_with_error([packing_of(frame, run, definition=definition) for frame in part]))
-    return PackingChange(before=means[0], after=means[1], definition=definition)
-
-
-def _check_last(last: int) -> None:
-    if last < 1:
-        raise InputError(f"last must be 1 frame or more: got {last}; {LAST_FRAMES} is usual")
 
 
 def _open(run: Run, definitions: Iterable[str]) -> tuple[FrameSequence, Series | None]:

@@ -47,7 +47,6 @@ class FilmTimes:
         end: float | None = None,
         every: float | None = None,
         rate: float = RATE,
-        most: int = MOST,
     ) -> Self:
         """Choose the times of a film's pictures from the ascending times (m,) [s] of the recorded frames.
 
@@ -55,15 +54,13 @@ class FilmTimes:
             start: Simulated time of the first picture [s]; None: that of the first frame.
             end: Latest simulated time of a picture [s]; None: that of the last frame.
             every: Simulated time between two pictures [s]; None: the least multiple of the median time between frames
-                for which the film has at most `most` pictures.
+                for which the film has at most `MOST` pictures.
             rate: Pictures per second of playing time [1/s].
 
         Raises:
             InputError: There are fewer than two frames or pictures, or an argument is out of its range.
         """
         recorded = np.asarray(recorded, dtype=np.float64)
-        if most < 2:
-            raise InputError(f"a film needs most_frames of at least 2: got {most}; leave it out for {MOST}")
         if len(recorded) < 2:
             raise InputError(f"a film needs at least 2 frames: got {len(recorded)}; draw a picture, .png")
         if not (math.isfinite(rate) and 0 < rate <= 100):
@@ -78,7 +75,7 @@ class FilmTimes:
             )
         spacing = float(np.median(np.diff(recorded)))
         if every is None:
-            every = spacing * max(1, math.ceil((high - low) / spacing / (most - 1) - 1e-6))
+            every = spacing * max(1, math.ceil((high - low) / spacing / (MOST - 1) - 1e-6))
         elif not (math.isfinite(every) and every >= spacing * (1 - 1e-6)):
             raise InputError(f"every must be {spacing:g} s or more, the time between the run's frames: got {every:g} s")
         steps = math.floor((high - low) / every + 1e-6)

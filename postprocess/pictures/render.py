@@ -114,7 +114,6 @@ def render_film(
     start: float | None = None,
     end: float | None = None,
     every: float | None = None,
-    most_frames: int = film.MOST,
     forces: bool = False,
     track: Track | None = None,
     overwrite: bool = False,
@@ -137,7 +136,6 @@ def render_film(
         start: Simulated time at which the film begins [s]; that of the first frame if not given.
         end: Simulated time at which the film ends [s]; that of the last frame if not given.
         every: Simulated time between two pictures [s]; if not given, a multiple of the recorded interval.
-        most_frames: Largest number of pictures if `every` is not given.
         forces: Whether to draw contact forces as lines, with a thickness proportional to the normal force.
         track: Shows the progress, see `Track`.
         overwrite: Whether to replace an existing output.
@@ -150,7 +148,7 @@ def render_film(
     style = Style.of([subject.run for subject in subjects], color_by=color_by, size=size, view=view)
     film.check_film(output, (size[0] * len(subjects), size[1]))
     film_times = film.FilmTimes.choose(
-        common_times(subjects), start=start, end=end, every=every, rate=frames_per_second, most=most_frames
+        common_times(subjects), start=start, end=end, every=every, rate=frames_per_second
     )
     indices = [film_times.indices(subject.frames.times) for subject in subjects]
     reject_existing(output, overwrite=overwrite)

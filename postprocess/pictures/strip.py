@@ -1,5 +1,6 @@
 """Draw pictures of several runs at several times in one figure, with one row per run and one scale."""
 
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from postprocess.pictures.canvas import Canvas, Style, Subject, union, visible_m
 from postprocess.report import figures
 from postprocess.report.tables import whole_file
 
+_LABEL = 14  # characters in a line of a row's label, about the height of a picture
 _SIZE = (400, 400)  # of a picture with room for a caption, which is cut off [pixel]
 
 
@@ -58,7 +60,7 @@ def draw_strip(rows: Sequence[Row], output: Path, *, columns: Sequence[str], foo
             if number < len(columns):
                 axes.set_title(columns[number], fontsize=7)
             if number % len(columns) == 0:
-                axes.set_ylabel(rows[number // len(columns)].label)
+                axes.set_ylabel(textwrap.fill(rows[number // len(columns)].label, _LABEL), fontsize=7)
         figures.add_footer(figure, [f"A picture is {width:.3g} mm wide.", *footer])
         with whole_file(output) as temporary:
             figure.savefig(temporary, format="png", dpi=130)

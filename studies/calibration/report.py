@@ -192,7 +192,9 @@ def _draw_fit(result: Result, fit: pd.DataFrame, path: Path) -> None:
             kept = (part["fitted"] == fitted).to_numpy()
             panel.errorbar(x[kept], part["value"][kept], yerr=1.96 * part["error"][kept], fmt="o", color=style.BLACK,
                            markerfacecolor=colour)  # fmt: skip
-        panel.set(xlabel=first if numeric else "condition", ylabel=measure)
+        column, _, phase = (text.strip() for text in measure.partition("@"))
+        after = {"": "", "-1": ", last phase"}.get(phase, f", phase {phase}")
+        panel.set(xlabel=first if numeric else "condition", ylabel=column + after)
     band = "Band: 95 % of what a measurement would give, error included; line: its median; open points: predicted only."
     style.add_footer(figure, [band, "Error bars: 95 % confidence of the data, 1.96 times their error."])
     style.save(figure, path, formats=("png", "svg"))

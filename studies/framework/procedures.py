@@ -18,6 +18,7 @@ from dem.errors import InputError
 from dem.record.document import Phase
 from dem.record.run import Run
 from postprocess.measures.motors import APART, SAMPLED_WORK
+from postprocess.measures.pull import averaged, interval_of
 from postprocess.measures.table import summarise_run
 from postprocess.statistics.points import ASPECT, SEED, mean_difference
 from postprocess.statistics.seeds import SeedMean
@@ -176,9 +177,10 @@ def _smooth(values: NDArray[np.float64], time: NDArray[np.float64], chosen: NDAr
     """
     if chosen.sum() < 2:
         return np.empty(0)
-    samples = max(round(_WINDOW / float(np.median(np.diff(time[chosen])))), 1)
-    kernel = np.full(samples, 1 / samples)
-    return np.convolve(values[chosen], kernel, mode="valid") if chosen.sum() >= samples else np.empty(0)
+    interval = interval_of(time[chosen])
+    if chosen.sum() < round(_WINDOW / interval):
+        return np.empty(0)
+    return averaged(values[chosen], interval, _WINDOW)
 
 
 def gained(work: NDArray[np.float64], before: NDArray[np.bool_]) -> float:
@@ -206,11 +208,10 @@ def half_compaction(time: NDArray[np.float64], height: NDArray[np.float64], dura
         return math.nan
     level = (1 + final.mean()) / 2
     time = time[moving]
-    samples = min(max(round(_WINDOW / float(np.median(np.diff(time)))), 1), len(time))
-    kernel = np.full(samples, 1 / samples)
+    interval = interval_of(time)
     # A moving mean belongs to the middle of its window; at time 0 the height is that of the rest before.
     centres, smooth = (
-        np.concatenate([[start], np.convolve(values, kernel, mode="valid")])
+        np.concatenate([[start], averaged(values, interval, _WINDOW)])
         for start, values in ((0.0, time), (1.0, height[moving]))
     )
     reached = np.nonzero(smooth <= level)[0]

@@ -19,6 +19,8 @@ from postprocess.measures.table import LAST_FRAMES
 from postprocess.report.tables import table_lines, whole_file
 from studies.framework.runs import DEFINITION, Collected
 
+TEXT = "findings.md"  #: Name of the text with findings, points and the full footer
+
 
 @dataclass(frozen=True, kw_only=True)
 class Reference:
@@ -75,11 +77,10 @@ class Origin:
         lacking = f", {missing} missing" if missing else ""
         return f"Study {self.found.study}, fidelity {fidelities}{engines}: {used} of {used + missing} runs{lacking}"
 
-    def figure_footer(self, points: str, text_name: str) -> list[str]:
+    def figure_footer(self, points: str) -> list[str]:
         """Return the two lines of the footer of a figure: runs and points; note, commits and other files.
 
-        `points` is a statement on the points, such as the number of seeds at each. `text_name` is the name of the text
-        file with the full footer.
+        `points` is a statement on the points, such as the number of seeds at each.
         """
         first, *more = (f"planned: {self.note}" if self.found.missing else self.note).split("; ")
         differs = f"{first[0].upper()}{first[1:]}{' and more' if more else ''}."
@@ -89,7 +90,7 @@ class Origin:
         made = f"{len(commits)} commits" if len(commits) > 2 else f"Commit {', '.join(commits)}"
         return [
             f"{self._which}; {points}",
-            f"{differs} {made}. More: {text_name}, provenance.json.",
+            f"{differs} {made}. More: {TEXT}, provenance.json.",
         ]
 
     def footer(self, points: str, *statements: str) -> list[str]:

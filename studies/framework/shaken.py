@@ -12,7 +12,7 @@ import pandas as pd
 from dem.errors import InputError
 from dem.record.run import Run, SceneData
 from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS, packing_of
-from postprocess.measures.table import LAST_FRAMES, packing_change, summarise_run
+from postprocess.measures.table import LAST_FRAMES, summarise_run
 from postprocess.statistics.points import ASPECT
 from studies.framework.figures import Histories, History, one_by_one
 from studies.framework.provenance import Reference
@@ -174,9 +174,9 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
             for stage, phase in wanted.items():
                 row[f"{stage} {definition} [-]"] = table.loc[phase, f"phi {definition} [-]"]
         elif definition in definitions:
-            change = packing_change(run, definition=definition, last=1, activity={_SHAKE})
-            row[f"phi_0 {definition} [-]"] = change.before.value
-            row[f"phi_f {definition} [-]"] = change.after.value
+            for stage in ("phi_0", "phi_f"):
+                last = run.frames.in_phase(wanted[stage])[-1]
+                row[f"{stage} {definition} [-]"] = packing_of(last, run, definition=definition)
     for stage, phase in wanted.items():
         row[f"{stage} {DEFINITION} SE in run [-]"] = table.loc[phase, f"phi {DEFINITION} SE [-]"]
     if "phi_f relaxed" in wanted:

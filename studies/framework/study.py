@@ -13,7 +13,7 @@ from postprocess.report.tables import meaning_lines, table_lines
 from postprocess.statistics.points import ASPECT, SEED, SEEDS, averaged, seeds_of
 from studies.framework.figures import BARS, Analysis, Figure
 from studies.framework.findings import CRITERION, Finding, Judged, findings_table
-from studies.framework.provenance import SAVOIE, Origin, Reference, make_folder
+from studies.framework.provenance import SAVOIE, TEXT, Origin, Reference, make_folder
 from studies.framework.runs import (
     ENGINE,
     ENGINE_NAMES,
@@ -32,7 +32,6 @@ from studies.framework.runs import (
 )
 
 COUNT = "smarticles [-]"
-TEXT = "findings.md"
 _MEANS = "Means over seeds ± standard error."
 
 
@@ -128,10 +127,10 @@ class Study:
         origin = Origin(found=found, note=note, full=full, command=command, reference=self.reference)
         footer = origin.footer(*self.statements(tables))
         header, rows = self.table(tables)
-        lines = self.text(tables, judged, table_lines(header, rows))
+        lines = self.text(judged, table_lines(header, rows))
         files = origin.write(output, footer, tables=tables, text=(TEXT, lines))
         measured = {run.run.path.name: run.run for run in found.runs}
-        short = origin.figure_footer(f"{self._seeds(tables)}.", TEXT)
+        short = origin.figure_footer(f"{self._seeds(tables)}.")
         analysis = Analysis(tables=tables, runs=measured, footer=short)
         files |= {path.name: path for path in self.draw(output, analysis)}
         verdicts = [f"{one.verdict.upper()}: {one.finding.says}\n    {one.ours}" for one in judged]
@@ -246,7 +245,7 @@ class Study:
         with style.style():
             return [path for figure in self.figures for path in figure.draw(output / figure.name, analysis)]
 
-    def text(self, tables: Mapping[str, pd.DataFrame], judged: Sequence[Judged], table: Sequence[str]) -> list[str]:
+    def text(self, judged: Sequence[Judged], table: Sequence[str]) -> list[str]:
         """Return the lines of the Markdown file: findings, remarks, and the short table of points.
 
         The argument `table` has the lines of the short table in Markdown.

@@ -13,7 +13,6 @@ from dem.phases.relax import Relax
 from dem.record.run import Run
 from dem.run.run import run_scene
 from dem.scene.reading import parse_scene
-from postprocess.measures.table import packing_change
 from studies.framework.procedures import activity
 
 
@@ -53,4 +52,3 @@ def test_old_manifests_say_it_by_the_type(tmp_path: Path, monkeypatch: pytest.Mo
             del phase["at_rest"]
         file.write_text(json.dumps(document))
     assert [phase.at_rest for phase in Run(run.path).phases] == [True, True, False, True]
-    assert packing_change(Run(run.path)) == packing_change(run)

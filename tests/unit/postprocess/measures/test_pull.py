@@ -118,10 +118,10 @@ def test_a_pull_that_has_just_begun_is_not_measured(tmp_path):
 
 def test_only_a_force_limit_stops_a_hook_on_the_way(pulled):
     pull, farther = pulled(triangle), {"distance_m": 1.02 * DISTANCE}
-    assert held_fast(pull, {**farther, "force_limit_N": HEIGHT})
+    assert held_fast(pull.raised, {**farther, "force_limit_N": HEIGHT})
     # Without a limit the last sample lies before the arrival because samples are rare.
-    assert not held_fast(pull, farther)
-    assert not held_fast(pull, {**farther, "force_limit_N": None})
+    assert not held_fast(pull.raised, farther)
+    assert not held_fast(pull.raised, {**farther, "force_limit_N": None})
 
 
 def test_the_error_of_the_ledger_is_that_of_the_pull_alone(tmp_path):

@@ -40,7 +40,7 @@ def test_the_radius_of_an_even_disc_holds_its_share():
     """A share s of an even disc lies within R √s: 0.707 R for half, 0.975 R for 95 %."""
     pile = column(0.02, 0.03)
     for share in (0.5, 0.95):
-        found = spread_radius(pile, share=share, axis=(0.0, 0.0))
+        found = spread_radius(pile, share=share)
         assert found == pytest.approx(0.02 * math.sqrt(share), rel=0.02)
 
 

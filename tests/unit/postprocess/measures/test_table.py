@@ -10,7 +10,6 @@ from postprocess import (
     link_crossings,
     measure_run,
     open_run,
-    packing_change,
     packing_fraction,
     read_frames,
     summarise_run,
@@ -103,18 +102,3 @@ def test_summary_averages_the_last_frames_of_each_phase(make_run):
     assert shake["phi voxel [-]"] == pytest.approx(last["phi voxel [-]"].iloc[-1], nan_ok=True)
     assert np.isnan(summary["com height SE [m]"][1])
     assert (shake["name"], shake["seed"]) == ("pile", 7)
-
-
-def test_packing_before_and_after_activity(make_run):
-    lifts = [(0, 0.0), (0, 0.005), (1, 0.0), (1, 0.001), (2, 0.002), (2, 0.003), (3, 0.009)]
-    directory = make_run(lifts)
-    table = measure_run(Run(directory), definitions=CHEAP)
-    change = packing_change(Run(directory), last=20)
-    # Only the relaxation before the shake, and not the one after it.
-    assert change.before.value == pytest.approx(table[PHI][[2, 3]].mean())
-    assert change.after.value == pytest.approx(table[PHI][[4, 5]].mean())
-    assert (change.before.count, change.after.count) == (2, 2)
-    assert change.definition == "second-highest-com"
-    assert change.before.standard_error > 0
-    shorter = packing_change(Run(directory), last=1, definition="top-percentile")
-    assert shorter.after.value == table["phi top-percentile [-]"][5]
