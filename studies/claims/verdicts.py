@@ -110,10 +110,9 @@ def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
             for name in ("text", "code"):
                 named = entry.get(name)
                 tested[name] = _tested(read, named, entry.get(f"{name}_instead"))
-                there = named and (results / f"{named[0]}-yade").is_dir()
-                tested[f"{name} on YADE"] = (
-                    _tested(read, [f"{named[0]}-yade", named[1]], optional=True) if there else None
-                )
+                named = entry.get(f"{name}_on_yade") or (named and [f"{named[0]}-yade", named[1]])
+                there = named and (results / named[0]).is_dir()
+                tested[f"{name} on YADE"] = _tested(read, named, optional=True) if there else None
             why = entry.get("untested") or entry.get("why", "")
             found.append(Claim(number=len(found) + 1, part=part["part"], says=entry["says"], tested=tested, why=why))
     return tuple(found)
