@@ -14,6 +14,7 @@ from studies.claims.verdicts import CLAIMS, Claim, claims
 
 RESULTS = Path(__file__).parents[2] / "results"
 MOST, HIGHEST = "shape change entangles most", "shape-change-most-entangled"
+BY_CODE, ON_YADE = "procedures-main-rigid", "procedures-code-yade"  # studies that test it
 
 
 def written(folder: Path, verdicts: dict[tuple[str, str], str]) -> Path:
@@ -21,7 +22,7 @@ def written(folder: Path, verdicts: dict[tuple[str, str], str]) -> Path:
     named = defaultdict(list)
     for part in yaml.safe_load(CLAIMS.read_text(encoding="utf-8")):
         for entry in part["claims"]:
-            for key in ("text", "code", "text_instead", "code_instead"):
+            for key in ("text", "code", "text_instead", "code_instead", "code_on_yade"):
                 if key in entry and entry[key][1] not in named[entry[key][0]]:
                     named[entry[key][0]].append(entry[key][1])
     for study, findings in named.items():
@@ -46,7 +47,7 @@ def one_of(found: tuple[Claim, ...], says: str) -> Claim:
 
 def test_a_claim_rests_on_what_its_studies_say(tmp_path: Path) -> None:
     folder = written(tmp_path, {})
-    (folder / "procedures-code" / "points.csv").write_text("point,seeds [-]\na,16\nb,8\n# Study\n")
+    (folder / BY_CODE / "points.csv").write_text("point,seeds [-]\na,16\nb,8\n# Study\n")
     found = claims(folder)
     assert [claim.number for claim in found] == list(range(1, len(found) + 1))
     assert {claim.verdict for claim in found} == {"reproduced", "not testable"}
@@ -54,6 +55,7 @@ def test_a_claim_rests_on_what_its_studies_say(tmp_path: Path) -> None:
     assert {name: one.basis for name, one in most.tested.items() if one is not None} == {
         "text": "168 – 494 smarticles, l/w 0.4 – 1.1, 2 seeds, links",
         "code": "168 – 494 smarticles, l/w 0.4 – 1.1, 8 – 16 seeds, links",
+        "code on YADE": "168 – 494 smarticles, l/w 0.4 – 1.1, 2 seeds, links",
     }
 
 
@@ -70,7 +72,7 @@ def test_a_claim_rests_on_what_its_studies_say(tmp_path: Path) -> None:
     ],
 )
 def test_two_protocols_make_one_verdict(tmp_path: Path, by_text: str, by_code: str, verdict: str) -> None:
-    results = written(tmp_path, {("procedures", HIGHEST): by_text, ("procedures-code", HIGHEST): by_code})
+    results = written(tmp_path, {("procedures", HIGHEST): by_text, (BY_CODE, HIGHEST): by_code})
     claim = one_of(claims(results), MOST)
     assert claim.verdict == verdict
     assert f"**{verdict}**" in text((claim,))
@@ -96,6 +98,15 @@ def test_our_test_decides_where_theirs_is_not_resolved(
     claim = one_of(claims(written(tmp_path, theirs | ours)), "shape change has the highest peak force")
     assert claim.verdict == verdict
     assert "; by a test of ours, strength-main-rigid: " in text((claim,))
+
+
+def test_a_claim_names_the_study_that_tests_it_on_yade(tmp_path: Path) -> None:
+    claim = one_of(claims(written(tmp_path, {(ON_YADE, HIGHEST): "not found"})), MOST)
+    on_yade = claim.tested["code on YADE"]
+    assert on_yade is not None
+    assert (on_yade.study, on_yade.verdict) == (ON_YADE, "not")
+    assert claim.verdict == "reproduced"  # YADE is no part of it
+    assert claim.engines["code"] == "opposite"
 
 
 def test_a_finding_that_is_not_there_is_named(tmp_path: Path) -> None:
