@@ -20,6 +20,7 @@ from dem.errors import InputError
 from postprocess.statistics.points import ASPECT, SEED, SEEDS
 
 CLAIMS = Path(__file__).with_name("claims.yaml")
+ON_YADE = {"procedures-main-rigid": "procedures-code-yade"}  #: Studies on YADE of others than STUDY-yade, by study
 
 _FOUND = {
     **dict.fromkeys(("found", "yes"), "reproduced"),
@@ -110,9 +111,9 @@ def claims(results: Path, listed: Path = CLAIMS) -> tuple[Claim, ...]:
             for name in ("text", "code"):
                 named = entry.get(name)
                 tested[name] = _tested(read, named, entry.get(f"{name}_instead"))
-                named = entry.get(f"{name}_on_yade") or (named and [f"{named[0]}-yade", named[1]])
-                there = named and (results / named[0]).is_dir()
-                tested[f"{name} on YADE"] = _tested(read, named, optional=True) if there else None
+                yade = named and [ON_YADE.get(named[0], f"{named[0]}-yade"), named[1]]
+                there = yade and (results / yade[0]).is_dir()
+                tested[f"{name} on YADE"] = _tested(read, yade, optional=True) if there else None
             why = entry.get("untested") or entry.get("why", "")
             found.append(Claim(number=len(found) + 1, part=part["part"], says=entry["says"], tested=tested, why=why))
     return tuple(found)
