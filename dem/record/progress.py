@@ -63,7 +63,7 @@ class ProgressWriter:
         except RunError:
             # A full disk stops the run where results are written, not here.
             return
-        if self.show:
+        if self.show and self._progress.phase is not None:  # the first record comes before the first phase
             self._draw(time, count, wall)
 
     def finish(self, *, remove: bool = True) -> None:
