@@ -96,6 +96,9 @@ def pin(x, y, low=-1.0, high=1.0):
         (pin(0, 1, low=0.0), 0),  # ends in the plane
         (pin(0, 1, low=0.5), 0),  # ends short of it
         (np.array([[0.0, 1, 0], [0.5, 1, 0], [0.5, 1.5, 0], [0, 1.5, 0]]), 0),  # lies in it
+        (np.array([[0.0, 1, -1], [0, 1, 0], [0.2, 1, 1], [0.4, 1, 1]]), 1),  # passes with a hinge in the plane
+        (np.array([[0.0, 1, -1], [0, 1, 0], [0.2, 1, 0], [0.2, 1, 1]]), 1),  # with its middle link in the plane
+        (np.array([[0.0, 1, 1], [0, 1, 0], [0.2, 1, 1], [0.4, 1, 1]]), 0),  # its hinge touches the plane
     ],
 )
 def test_touching_is_not_passing(other, expected):
