@@ -126,5 +126,7 @@ def test_a_flipped_bit_is_found_by_the_checksum_and_a_series_without_checksums_i
 def test_a_series_is_read_while_it_is_open_elsewhere(run, mode, locking):
     with h5py.File(run / "series.h5", mode, locking=locking):
         assert len(read_series(run).time) == 3
+        if (mode, locking) != ("r+", True):
+            return
         code = f"from dem.record.series import read_series; assert len(read_series({str(run)!r}).time) == 3"
         subprocess.run([sys.executable, "-c", code], check=True)
