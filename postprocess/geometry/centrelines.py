@@ -11,7 +11,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from dem.errors import InputError, nearest
-from dem.record.files import cannot_read
+from dem.record.files import cannot_read, read_csv
 from dem.record.frame import frozen
 from postprocess.geometry.links import Floats, Whole
 from postprocess.geometry.segments import checked_segments
@@ -84,12 +84,9 @@ _Lines = tuple[Floats, Whole, Whole, NDArray[Any] | None]  # points (P, 3), line
 
 def _read_csv(path: Path, unit: str | None) -> tuple[Floats, Whole, Whole, NDArray[Any] | None, str | None]:
     try:
-        table = pd.read_csv(path, skipinitialspace=True)
+        table = read_csv(path, skipinitialspace=True)
     except (OSError, ValueError) as error:
         cannot_read("centre lines", path, error, _REMEDY)
-    if not isinstance(table.index, pd.RangeIndex):  # pandas takes the first columns of longer rows for an index
-        widths = f"{len(table.columns) + table.index.nlevels} cells, its header {len(table.columns)}"
-        _reject(path, f"its rows have {widths}", "name each column, or take commas away from the ends of rows")
     headers = [str(name).partition("[") for name in table.columns]
     table.columns = pd.Index([name.strip().lower() for name, _, _ in headers])
     missing = [name for name in ("body", "x", "y", "z") if name not in table.columns]

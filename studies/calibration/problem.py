@@ -15,7 +15,7 @@ from pydantic import Field, ValidationError, model_validator
 from scipy import stats
 
 from dem.errors import InputError, shown
-from dem.strict import Strict, explained
+from dem.strict import Strict, equal, explained
 from dem.yaml_text import parse_yaml
 from templates.sweep.expand import Point, points_of
 from templates.sweep.from_scene import as_template
@@ -288,10 +288,11 @@ def _read_data(
         if predict not in (0, 1):
             raise InputError(f"{where}: {PREDICT}: {predict!r} is neither 0 (fit) nor 1 (predict only)")
         condition = {name: row[name] for name in variables}
-        if condition not in conditions:
+        index = next((k for k, one in enumerate(conditions) if equal(one, condition)), len(conditions))
+        if index == len(conditions):
             conditions.append(condition)
         datum = Datum(
-            condition=conditions.index(condition),
+            condition=index,
             measure=str(row[MEASURE]),
             value=float(value),
             error=float(error),

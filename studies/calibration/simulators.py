@@ -12,7 +12,10 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError, RunError, nearest
+from dem.record.files import read_csv
 from dem.record.run import Run
+from dem.strict import equal
+from dem.terminal import warn
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import summarise_run
 from studies.calibration.emulator import Array
@@ -48,7 +51,7 @@ class FunctionSimulator:
 def read_runs(path: Path) -> pd.DataFrame:
     """Read a table of runs made elsewhere; InputError if it cannot be read."""
     try:
-        return pd.read_csv(path, comment="#")
+        return read_csv(path, comment="#")
     except (OSError, ValueError) as error:
         raise InputError(
             f"--table {path}: cannot be read: {error}; give a CSV file whose first line names columns"
@@ -65,7 +68,7 @@ class TableSimulator:
         needed |= {datum.measure for datum in problem.data}
         for name in sorted(needed - set(table.columns)):
             raise InputError(f"{source}: column {name!r} is missing; columns are {', '.join(table.columns)}")
-        self.problem, self.table = problem, table
+        self.problem, self.table, self.source = problem, table, source
 
     def planned(self, wave: int) -> Array:
         """Return the parameters (n, d) of all rows."""
@@ -75,15 +78,23 @@ class TableSimulator:
     def run(self, wave: int, theta: Array) -> list[tuple[Mapping[str, Value], Measured | None]]:
         """Return variables and measures of the rows whose variables match a condition of the data.
 
-        `wave` and `theta` are not used: the table is the only wave.
+        `wave` and `theta` are not used: the table is the only wave. A warning states how many rows match no condition.
         """
         found: list[tuple[Mapping[str, Value], Measured | None]] = []
         measures = list(dict.fromkeys(datum.measure for datum in self.problem.data))
+        others = []
         for row in self.table.to_dict("records"):
+            own = {name: row[name] for name in self.problem.conditions[0]}
             for index, condition in enumerate(self.problem.conditions):
-                if all(row[name] == value for name, value in condition.items()):
+                if equal(own, condition):
                     parameters = {name: row[name] for name in self.problem.names}
                     found.append(({**parameters, **condition, CONDITION: index}, {m: row[m] for m in measures}))
+                    break
+            else:
+                others.append(own)
+        if others:
+            place = ", ".join(f"{name} {value}" for name, value in others[0].items())
+            warn(f"{self.source}: {len(others)} of {len(self.table)} runs are left out: no data are at {place}")
         return found
 
 
