@@ -84,11 +84,11 @@ def reject_inflated(archive: zipfile.ZipFile | None, most: int) -> None:
         raise ValueError(f"it would unpack to {total} bytes, at most {most} are possible")
 
 
-def read_csv(path: Path, **options: Any) -> pd.DataFrame:
-    """Return a CSV file as a table, by `pandas.read_csv` with its options.
+def read_csv(what: str, path: Path, remedy: str, **options: Any) -> pd.DataFrame:
+    """Return a CSV file as a table, by `pandas.read_csv` with its options; see `cannot_read` for `what` and `remedy`.
 
-    InputError if rows have more cells than the header has names: pandas would take the first cells for an index, and
-    all columns would be those of their neighbours.
+    InputError if it cannot be read, or rows have more cells than the header has names: pandas would take the first
+    cells for an index, and all columns would be those of their neighbours.
     """
     import pandas as pd  # noqa: PLC0415  (slow to import, and no run needs it)
 
@@ -96,9 +96,10 @@ def read_csv(path: Path, **options: Any) -> pd.DataFrame:
         try:
             return pd.read_csv(path, index_col=False, **options)
         except pd.errors.ParserWarning:
-            raise InputError(
-                f"{path}: rows have more cells than the first line has names; name each column, or take out the others"
-            ) from None
+            cause = "rows have more cells than the first line has names"
+            cannot_read(what, path, cause, "name each column, or take out the other cells")
+        except (OSError, ValueError) as error:
+            cannot_read(what, path, error, remedy)
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:

@@ -83,10 +83,7 @@ _Lines = tuple[Floats, Whole, Whole, NDArray[Any] | None]  # points (P, 3), line
 
 
 def _read_csv(path: Path, unit: str | None) -> tuple[Floats, Whole, Whole, NDArray[Any] | None, str | None]:
-    try:
-        table = read_csv(path, skipinitialspace=True)
-    except (OSError, ValueError) as error:
-        cannot_read("centre lines", path, error, _REMEDY)
+    table = read_csv("centre lines", path, _REMEDY, skipinitialspace=True)
     headers = [str(name).partition("[") for name in table.columns]
     table.columns = pd.Index([name.strip().lower() for name, _, _ in headers])
     missing = [name for name in ("body", "x", "y", "z") if name not in table.columns]

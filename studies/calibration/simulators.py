@@ -50,12 +50,7 @@ class FunctionSimulator:
 
 def read_runs(path: Path) -> pd.DataFrame:
     """Read a table of runs made elsewhere; InputError if it cannot be read."""
-    try:
-        return read_csv(path, comment="#")
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"--table {path}: cannot be read: {error}; give a CSV file whose first line names columns"
-        ) from error
+    return read_csv("runs of --table", path, "give a CSV file whose first line names columns", comment="#")
 
 
 class TableSimulator:

@@ -250,7 +250,9 @@ def test_runs_of_a_table_match_conditions_in_spite_of_rounding(
 def test_rows_of_a_table_that_are_longer_than_its_header_are_rejected(tmp_path: Path) -> None:
     for first in (1, 0):  # rows that begin with 0, 1, … would look like those of a table without an index
         (tmp_path / "runs.csv").write_text(f"friction,wall\n{first},2,3\n{first + 1},5,6\n")
-        with pytest.raises(InputError, match=r"runs.csv: rows have more cells than the first line has"):
+        with pytest.raises(
+            InputError, match=r"cannot read runs of --table .*/runs.csv: rows have more cells than .*; name each"
+        ):
             read_runs(tmp_path / "runs.csv")
 
 
