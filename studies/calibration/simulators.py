@@ -70,6 +70,11 @@ class TableSimulator:
         found: Array = self.table[list(self.problem.names)].to_numpy(np.float64)
         return found
 
+    def listing(self) -> str:
+        """Return in words how many runs are at conditions of the data."""
+        found = self.run(1, self.planned(1))
+        return f"{self.source}: {len(found)} of {len(self.table)} runs are at conditions of the data"
+
     def run(self, wave: int, theta: Array) -> list[tuple[Mapping[str, Value], Measured | None]]:
         """Return variables and measures of the rows whose variables match a condition of the data.
 
@@ -93,6 +98,19 @@ class TableSimulator:
         return found
 
 
+def column_and_phase(name: str, kinds: Sequence[str], where: str) -> tuple[str, int]:
+    """Return column and index of the phase of a measure, `COLUMN` or `COLUMN @ PHASE`; see `measured`.
+
+    InputError, which begins with the place `where`, if there is no such phase among those of the given `kinds`.
+    """
+    column, _, phase = (part.strip() for part in name.partition("@"))
+    try:
+        return column, range(len(kinds))[int(phase or -1)]
+    except (ValueError, IndexError):
+        there = ", ".join(f"{index} {kind}" for index, kind in enumerate(kinds))
+        raise InputError(f"{where}: measure {name!r}: no phase {phase!r}; there are {there}") from None
+
+
 def measured(run: Run, names: Sequence[str]) -> dict[str, float]:
     """Return measures of a run by their names, as means over the last frames of a phase.
 
@@ -100,15 +118,8 @@ def measured(run: Run, names: Sequence[str]) -> dict[str, float]:
     phase, from 0, or from the end as -1; default: the last phase. InputError if there is no such phase or column, or a
     file is damaged.
     """
-    count = len(run.phases)
-    wanted: dict[str, tuple[str, int]] = {}
-    for name in names:
-        column, _, phase = (part.strip() for part in name.partition("@"))
-        try:
-            index = range(count)[int(phase or -1)]
-        except (ValueError, IndexError):
-            raise InputError(f"{run.path}: measure {name!r}: no phase {phase!r}; there are 0 to {count - 1}") from None
-        wanted[name] = column, index
+    kinds = [phase.type for phase in run.phases]
+    wanted = {name: column_and_phase(name, kinds, str(run.path)) for name in names}
     # Costly definitions are measured only if they are asked for.
     used = [one for one in DEFINITIONS if any(one in column for column, _ in wanted.values())]
     table = summarise_run(run, definitions=used, phases={index for _, index in wanted.values()}).set_index("phase")
