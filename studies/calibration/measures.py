@@ -29,7 +29,7 @@ def check_measures(problem: Problem) -> None:
         column, phase = column_and_phase(datum.measure, [one.kind for one in scene.phases], where)
         key = datum.condition, phase
         if key not in known:
-            known[key] = _columns(scene, phase)
+            known[key] = columns_of_scene(scene, phase)
         if column not in known[key]:
             raise InputError(
                 f"{where}: measure {datum.measure!r}: runs will have no column {column!r} in phase {phase}, "
@@ -37,7 +37,7 @@ def check_measures(problem: Problem) -> None:
             )
 
 
-def _columns(scene: Scene, phase: int) -> list[str]:
+def columns_of_scene(scene: Scene, phase: int) -> list[str]:
     """Return the columns that `smarticles measure` will have for a phase of a run of a scene."""
     run = Run(Path(scene.name))
     # `Run` reads its parts at the first access and keeps them here; this run has no files yet.

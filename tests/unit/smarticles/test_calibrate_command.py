@@ -203,9 +203,11 @@ def test_measures_of_frames_and_series_are_accepted(calibration: Path, smarticle
 
 def test_a_condition_of_the_last_wave_alone_is_checked_at_the_start(calibration: Path, smarticles: Smarticles) -> None:
     (calibration.parent / "data.csv").write_text(DATA.replace("\n12,", "\n-12,"))
-    said = smarticles("calibrate", calibration, "--dry-run")
+    out = calibration.parent / "out"
+    said = smarticles("calibrate", calibration, "--out", out, "--submit", "none")
     assert said.status == 2
     assert "count: -12 is out of range" in said.err
+    assert not out.exists()
 
 
 def test_a_variable_without_effect_is_rejected(calibration: Path, smarticles: Smarticles) -> None:
