@@ -228,7 +228,8 @@ def _reject(path: Path, what: str, error: Exception) -> NoReturn:
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
     # HDF5 refuses a name that this or another process has open in another way, or that a killed one had open.
-    with Journaled(path) if journal_of(path).exists() else path.open("rb") as stored, h5py.File(stored, "r") as file:
+    found = Journaled(path) if journal_of(path).exists() else path.open("rb", buffering=0)
+    with found as stored, h5py.File(stored, "r") as file:
         yield file
 
 
