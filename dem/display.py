@@ -24,6 +24,7 @@ INTERVAL_S = 30.0  # between two lines where there is no terminal
 PATIENCE_S = 2.0  # before the first line, and before a bar appears: shorter work shows nothing
 _REFRESHED_PER_S = 4.0
 _BARS, _GAP = (6, 30), 2  # least and greatest width of bars, and gap between columns, in characters
+_ECHO = 5  # characters that stay free: the terminal writes ^C there, and would else begin a new line
 _CELL = 100  # characters, width of the output of a notebook's cell
 
 
@@ -162,6 +163,7 @@ class Display:
                     self.print("; ".join(row.to_text() for row in self._rows))
 
     def _drawing(self, console: Console) -> RenderableType:
+        from rich.constrain import Constrain  # noqa: PLC0415
         from rich.progress_bar import ProgressBar  # noqa: PLC0415
         from rich.table import Table  # noqa: PLC0415
         from rich.text import Text  # noqa: PLC0415
@@ -179,14 +181,15 @@ class Display:
         ]
         # The bars have the columns that texts leave free; texts are cut only if even short bars do not fit.
         texts = sum(max(map(len, column)) for column in zip(*((row.label, *more) for row, *more in cells), strict=True))
-        width = min(max(console.width - texts - 3 * _GAP - 1, _BARS[0]), _BARS[1])
+        room = console.width - _ECHO
+        width = min(max(room - texts - 3 * _GAP, _BARS[0]), _BARS[1])
         grid = Table.grid(padding=(0, _GAP))
         for _ in range(4):
             grid.add_column(no_wrap=True, overflow="ellipsis")
         for row, detail, left in cells:
             bar = "" if row.fraction is None else ProgressBar(1.0, row.fraction, width=width)
             grid.add_row(Text(escaped(row.label)), bar, Text(escaped(detail)), Text(left))
-        return grid
+        return Constrain(grid, room)
 
     def _html(self) -> str:
         from rich.console import Console  # noqa: PLC0415

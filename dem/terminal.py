@@ -1,13 +1,13 @@
 """Text for the terminal: control characters as escapes, and spellings for terminals without UTF-8."""
 
 import codecs
+import re
 import shutil
 import sys
 import unicodedata
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from io import TextIOWrapper
-from textwrap import wrap
 from typing import Any, TextIO, cast
 
 # Controls but tab and newline, marks that reverse the direction of text, and separators of lines. A terminal obeys
@@ -56,12 +56,15 @@ def writes_unicode(stream: TextIO) -> bool:
 
 @contextmanager
 def spelling(*streams: TextIO) -> Iterator[None]:
-    """Context manager in which streams write spellings for characters that their encodings lack."""
+    """Context manager in which streams write spellings for characters that their encodings lack.
+
+    UTF-8 lacks the characters that stand for undecodable bytes in names of files.
+    """
     with ExitStack() as stack:
         for stream in streams:
-            if isinstance(stream, TextIOWrapper) and stream.errors == "strict" and not writes_unicode(stream):
+            if isinstance(stream, TextIOWrapper):
+                stack.callback(stream.reconfigure, errors=stream.errors)
                 stream.reconfigure(errors=_SPELLED)
-                stack.callback(stream.reconfigure, errors="strict")
         yield
 
 
@@ -82,7 +85,8 @@ class Printable:
 
 def warn(text: str) -> None:
     """Print a warning to standard error."""
-    print(f"smarticles: warning: {text}", file=sys.stderr)
+    line = f"smarticles: warning: {text}"
+    print(folded(line, width=screen_width(sys.stderr), at="; "), file=sys.stderr)
 
 
 def bare(stream: TextIO) -> TextIO:
@@ -108,16 +112,33 @@ def screen_width(stream: TextIO | None = None) -> int | None:
     return shutil.get_terminal_size().columns if stream.isatty() else None
 
 
-def folded(text: str, *, width: int | None, indent: str = "") -> str:
+def folded(text: str, *, width: int | None, at: str = " ") -> str:
     """Break the lines of a text that are longer than `width` characters; None: nothing is broken.
 
-    Continued lines begin with the spaces of their line and `indent`.
+    Lines are broken at the text `at`, and between words where that is not enough. Continued lines begin below the last
+    gap of two or more spaces in the first four fifths of their line, so that columns stay columns; without a gap they
+    begin with two spaces.
     """
     if width is None:
         return text
-    lines = []
-    for line in text.splitlines():
-        start = line[: len(line) - len(line.lstrip())] + indent
-        options: dict[str, Any] = {"break_on_hyphens": False, "break_long_words": False}
-        lines += [line] if len(line) <= width else wrap(line, width, subsequent_indent=start, **options)
-    return "\n".join(lines)
+    return "\n".join(piece for line in text.split("\n") for piece in _pieces(line, width, at))
+
+
+def _pieces(line: str, width: int, at: str) -> list[str]:
+    if len(line) <= width:
+        return [line]
+    room = min(4 * width // 5, width - max(map(len, line.split()), default=0))
+    gaps = [gap.end() for gap in re.finditer(r"^ +|  +", line) if gap.end() <= room]
+    indent = " " * (gaps[-1] if gaps else 2)
+    words = line.lstrip(" ")
+    pieces = [line[: len(line) - len(words)]]
+    for part in words.split(at):
+        joined = pieces[-1] + (at if pieces[-1].strip() else "") + part
+        if len(joined) > width and pieces[-1].strip():
+            pieces[-1] += at.rstrip()
+            pieces.append(indent + part)
+        else:
+            pieces[-1] = joined
+    if at == " ":
+        return pieces
+    return [short for piece in pieces for short in _pieces(piece, width, " ")]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from dem.display import progress_of
 from dem.errors import InputError
 from dem.record.names import OF_SWEEP
-from dem.terminal import warn
+from dem.terminal import folded, screen_width, warn
 from smarticles import sweeps
 from smarticles.command_line import Commands, add_options, columns
 
@@ -114,7 +114,7 @@ def run_calibrate(arguments: argparse.Namespace) -> int:
     output = arguments.out / "results"
     with progress_of("writing tables and figures"):
         lines = write(result, output, arguments.command_line)
-    print("\n".join(lines))
+    print(folded("\n".join(lines), width=screen_width()))
     print(f"tables and figures: {output}")
     return 0
 

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 from dem.display import progress_of
 from dem.errors import InputError
-from dem.terminal import warn
-from smarticles.command_line import Cell, Commands, add_options, as_json, columns, names, reject_existing
-from smarticles.measuring import grouped, measured, of_phase, sources
+from dem.terminal import screen_width, warn
+from smarticles.command_line import Cell, Commands, add_options, as_json, column_blocks, names, reject_existing
+from smarticles.measuring import PHASE, grouped, measured, of_phase, sources
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _COMPARED = "second-highest-com"
-_WIDTH = 100  # characters of a terminal
+_WIDTH = 100  # most characters of a line of the legend
 _Column = tuple[str, str, str, float]  #: Heading, column of the full table, number format, unit conversion factor
 _ALWAYS = (("phase", "phase type", "", 1.0), ("t [s]", "time [s]", ".2f", 1.0))
 # Shown with --frames only, since their means over several frames have no meaning.
@@ -172,14 +172,18 @@ def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> s
         for row in table.to_dict("records")
     ]
     header = [*by, "runs"] if by else []
-    lines = columns([*header, *(heading for heading, *_ in shown)], rows).splitlines()
-    if by:
-        return "\n".join(lines)
-    blocks, previous = [lines[0]], None
-    for run, line in zip(table["run"], lines[1:], strict=True):
-        blocks += [line] if run == previous else [f"{run}:", line]
-        previous = run
-    return "\n".join(blocks)
+    blocks = column_blocks(
+        [*header, *(heading for heading, *_ in shown)], rows, keys=len(named) + len(PHASE) if by else len(_ALWAYS)
+    )
+    return "\n\n".join("\n".join(block if by else _with_names(block, list(table["run"]))) for block in blocks)
+
+
+def _with_names(lines: Sequence[str], runs: Sequence[str]) -> list[str]:
+    """Insert the name of each run before its rows into the lines of a table, which begin with the header."""
+    named = [lines[0]]
+    for previous, run, line in zip([None, *runs], runs, lines[1:], strict=False):
+        named += [line] if run == previous else [f"{run}:", line]
+    return named
 
 
 def _notes(table: pd.DataFrame) -> list[str]:
@@ -243,4 +247,5 @@ def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str
         lines += [f"at yield: {QUANTITIES[YIELD]}"] if YIELD in shown else []
         lines += [f"at fracture: {QUANTITIES[FRACTURE]}"] if FRACTURE in shown else []
         lines.append(f"widening: {QUANTITIES[WIDENING]}")
-    return "\n".join(["", *(part for line in lines for part in wrap(line, _WIDTH, subsequent_indent="  "))])
+    width = min(screen_width() or _WIDTH, _WIDTH)
+    return "\n".join(["", *(part for line in lines for part in wrap(line, width, subsequent_indent="  "))])
