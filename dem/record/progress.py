@@ -14,7 +14,7 @@ from dem.terminal import warn
 
 INTERVAL = 1.0  # s of wall time between updates
 LATE = 0.8  # share of a phase of unknown length from which on its progress slows down
-TRUST_S, TRUST_SHARE = 3.0, 0.1  # the planned cost counts as that much measured time [s], or share of the run
+TRUST_S, TRUST_SHARE = 0.5, 0.1  # time [s] and share of the run for which the plan counts as measured
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class Estimate:
         work, total = self._work(phase, time), sum(cost.wall_s for cost in self.phases)
         if self._start is None:
             self._start = wall, work
-        trust = max(TRUST_S, TRUST_SHARE * total)
+        trust = TRUST_S + TRUST_SHARE * total
         pace = (wall - self._start[0] + trust) / (work - self._start[1] + trust)
         return pace * (total - work)
 

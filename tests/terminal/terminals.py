@@ -42,14 +42,12 @@ class Terminal:
         self.raw = ""  #: Everything that was written, escape codes included
         kept = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "COLUMNS", "LINES")}
         self.process = subprocess.Popen(
-            words,
+            ["setsid", "--ctty", *words],  # Ctrl-C and hanging up become signals
             cwd=folder,
             env={**kept, "TERM": "xterm-256color", **(environment or {})},
             stdin=slave,
             stdout=slave,
             stderr=slave,
-            start_new_session=True,
-            preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0),  # Ctrl-C and hanging up become signals
         )
         os.close(slave)
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -116,8 +114,8 @@ class Terminal:
         """Wait until the screen shows what `seen` returns True for; return its lines."""
         end = time.monotonic() + PATIENCE_S
         while not seen(lines := self.lines):
-            ended = self.process.poll() is not None and not self._reader.is_alive()
-            assert not ended and time.monotonic() < end, "\n".join(["never seen; the screen:", *self.lines])
+            over = time.monotonic() > end or (self.process.poll() is not None and not self._reader.is_alive())
+            assert not over, "\n".join(["never seen; the screen:", *self.lines])
             time.sleep(0.05)
         return lines
 
