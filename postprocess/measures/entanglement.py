@@ -169,6 +169,14 @@ def polygon_crossings(segments: ArrayLike, body: ArrayLike) -> PolygonCrossings:
 
     Source:
         Savoie et al., Soft Matter 2023, ⟨N⟩ of smarticles; here for any flat curve.
+
+    Example:
+        >>> t = 2 * np.pi * np.arange(60) / 60
+        >>> ring = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
+        >>> rings = np.stack([ring, ring[:, [0, 2, 1]] + [1.0, 0, 0]])
+        >>> segments = np.stack([rings, np.roll(rings, -1, axis=1)], axis=2).reshape(120, 2, 3)
+        >>> polygon_crossings(segments, np.repeat([0, 1], 60)).crossings
+        array([1, 1])
     """
     segments, body = checked_segments(segments, body)
     found = curves(segments, body)
