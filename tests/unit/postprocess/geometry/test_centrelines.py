@@ -266,4 +266,8 @@ def test_grids_with_other_cells_and_damaged_files_are_rejected(tmp_path, capfd):
         with pytest.raises(InputError, match=f"{name}: truncated or not VTK") as error:
             read_centrelines(tmp_path / name, unit="m")
         assert "\n" not in str(error.value)
+    # Cut off where a section ends, it is a valid file without cells, on which filters of VTK end the process.
+    (tmp_path / "d.vtk").write_bytes(content[: content.index(b"CELLS")])
+    with pytest.raises(InputError, match="d.vtk: it holds no lines"):
+        read_centrelines(tmp_path / "d.vtk", unit="m")
     assert capfd.readouterr() == ("", "")
