@@ -148,9 +148,16 @@ class Folder:
         """Lock the sweep, and yield the file descriptor that the processes of its runs must inherit.
 
         The lock lasts until the last process with this descriptor ends, so that runs which outlive a killed parent
-        process keep the sweep locked. InputError if another process holds the lock, or the file system has no locks.
+        process keep the sweep locked. InputError if another process holds the lock, if the directory cannot be written,
+        or if its file system has no locks.
         """
-        with (self.path / ".lock").open("a") as file:
+        try:
+            lock = (self.path / ".lock").open("a")
+        except OSError as error:
+            raise InputError(
+                f"{self.path}: cannot be written ({error.strerror}); allow it, or copy the sweep"
+            ) from None
+        with lock as file:
             if not acquired(file, str(self.path)):
                 raise InputError(
                     f"{self.path}: runs of this sweep are being computed already; wait for them "

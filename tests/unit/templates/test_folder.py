@@ -131,6 +131,13 @@ def test_runs_left_behind_by_a_killed_runner_still_hold_the_sweep(make_folder: M
         pass
 
 
+def test_a_sweep_that_cannot_be_written_ends_in_one_line(make_folder: MakeFolder) -> None:
+    folder = make_folder()
+    (folder.path / ".lock").mkdir()
+    with pytest.raises(InputError, match=r"cannot be written \(Is a directory\); allow it, or copy"), folder.lock():
+        pass
+
+
 def test_a_sweep_on_a_file_system_without_locks_ends_in_one_line(
     make_folder: MakeFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
