@@ -93,7 +93,7 @@ def run_calibrate(arguments: argparse.Namespace) -> int:
     if arguments.table is None:
         check_measures(problem)
     else:
-        table = TableSimulator(problem, read_runs(arguments.table), str(arguments.table))
+        table = TableSimulator(problem, read_runs(arguments.table, problem), str(arguments.table))
     if arguments.dry_run:
         print(_listing(problem) if table is None else table.listing())
         return 0

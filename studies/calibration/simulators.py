@@ -22,6 +22,7 @@ from studies.calibration.emulator import Array
 from studies.calibration.inference import Measured
 from studies.calibration.problem import CONDITION, Problem
 from templates.sweep.render import Value
+from templates.sweep.sweep_file import cell_value
 
 
 @dataclass(frozen=True)
@@ -48,9 +49,17 @@ class FunctionSimulator:
             return None
 
 
-def read_runs(path: Path) -> pd.DataFrame:
-    """Read a table of runs made elsewhere; InputError if it cannot be read."""
-    return read_csv("runs of --table", path, "give a CSV file whose first line names columns", comment="#")
+def read_runs(path: Path, problem: Problem) -> pd.DataFrame:
+    """Read a table of runs made elsewhere; InputError if it cannot be read.
+
+    Variables of the data of the problem are read as they are there: 007 is text.
+    """
+    variables = dict.fromkeys(problem.conditions[0], str)
+    remedy = "give a CSV file whose first line names columns"
+    table = read_csv("runs of --table", path, remedy, comment="#", dtype=variables)
+    for name in variables.keys() & set(table.columns):
+        table[name] = table[name].map(cell_value, na_action="ignore")
+    return table
 
 
 class TableSimulator:

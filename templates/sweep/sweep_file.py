@@ -310,11 +310,13 @@ def parse_table(text: str, source: str) -> list[dict[str, bool | int | float | s
         if len(row) != len(header) or not all(cell.strip() for cell in row):
             msg = f"{source}, row {number}: expected {len(header)} filled cells ({', '.join(header)}): got {row!r}"
             raise InputError(msg)
-        table.append({name: _cell(cell.strip()) for name, cell in zip(header, row, strict=True)})
+        table.append({name: cell_value(cell) for name, cell in zip(header, row, strict=True)})
     return table
 
 
-def _cell(text: str) -> bool | int | float | str:
+def cell_value(text: str) -> bool | int | float | str:
+    """Return the value of a cell of a table, see `parse_table`."""
+    text = text.strip()
     if text.lower() in _BOOLEANS:
         return _BOOLEANS[text.lower()]
     if _WHOLE.match(text):

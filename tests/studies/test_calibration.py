@@ -237,7 +237,7 @@ def test_runs_of_a_table_match_conditions_in_spite_of_rounding(
     table = pd.DataFrame([{**values, **simulated(values)} for values in problem.runs(1, theta)])
     rounded = table.replace({"l_over_w": {0.7: 0.7000000000000001}})
     rounded.to_csv(tmp_path / "runs.csv", index=False)
-    found = TableSimulator(problem, read_runs(tmp_path / "runs.csv"), "runs.csv").run(1, theta)
+    found = TableSimulator(problem, read_runs(tmp_path / "runs.csv", problem), "runs.csv").run(1, theta)
     assert len(found) == len(table) == 60
     assert {values["l_over_w"] for values, _ in found} == set(ASPECTS)
     assert capsys.readouterr().err == ""
@@ -247,13 +247,24 @@ def test_runs_of_a_table_match_conditions_in_spite_of_rounding(
     assert stated in capsys.readouterr().err
 
 
+def test_text_and_booleans_of_a_table_are_those_of_the_data(tmp_path: Path) -> None:
+    problem = written(tmp_path, (0.5, 0.6), keys="budget: 60\nwaves: 1")
+    data = "sand,flat,measure,value,error\n007,true,phi,0.1,0.01\n7,false,phi,0.1,0.01\n"
+    (tmp_path / "data.csv").write_text(data)
+    problem = load_problem(tmp_path / "calibration.yaml")
+    (tmp_path / "runs.csv").write_text("friction,wall,sand,flat,phi\n0.5,0.6,007,TRUE,0.1\n0.5,0.6,7,False,0.2\n")
+    found = TableSimulator(problem, read_runs(tmp_path / "runs.csv", problem), "runs.csv").run(1, np.empty(0))
+    assert [(values["condition"], measured) for values, measured in found] == [(0, {"phi": 0.1}), (1, {"phi": 0.2})]
+
+
 def test_rows_of_a_table_that_are_longer_than_its_header_are_rejected(tmp_path: Path) -> None:
+    problem = written(tmp_path, (0.5, 0.6))
     for first in (1, 0):  # rows that begin with 0, 1, … would look like those of a table without an index
         (tmp_path / "runs.csv").write_text(f"friction,wall\n{first},2,3\n{first + 1},5,6\n")
         with pytest.raises(
             InputError, match=r"cannot read runs of --table .*/runs.csv: rows have more cells than .*; name each"
         ):
-            read_runs(tmp_path / "runs.csv")
+            read_runs(tmp_path / "runs.csv", problem)
 
 
 def test_data_that_differ_by_rounding_are_at_one_condition(tmp_path: Path) -> None:
