@@ -198,7 +198,8 @@ class Means:
                     draw_fits(axes, places, self.fit(tables, rows, column, places), properties["color"])
                     properties["linestyle"] = "none"
                 if len(rows):
-                    errors = scale * rows[marked(column, "95 %")].to_numpy()
+                    bars = scale * rows[marked(column, "95 %")]
+                    errors = None if bars.isna().all() else bars.to_numpy()
                     shown = {"label": label if number else series.label, "across": rows.get(marked(self.x, "95 %"))}
                     draw_means(axes, x[rows.index], scale * rows[column], errors, properties=properties, **shown)
                     positive &= bool((rows[column] > 0).all())
