@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import sys
-import time
 from collections.abc import Container, Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
+from dem.display import progress_of
 from dem.errors import InputError
-from dem.terminal import redraw, warn
+from dem.terminal import warn
 from smarticles.command_line import Cell, Commands, add_options, as_json, columns, names, reject_existing
 from smarticles.measuring import grouped, measured, of_phase, sources
 
@@ -97,9 +96,10 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
         warn(warning)
     jobs = arguments.jobs or usable_cores()
-    table = measured(
-        arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=_Progress()
-    )
+    with progress_of("measuring") as progress:
+        table = measured(
+            arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=progress
+        )
     if arguments.phase is not None:
         try:
             table = of_phase(table, arguments.phase)
@@ -128,23 +128,6 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     if profile is not None:
         print(f"{profile}: φ(r, z), {len(rings)} rows")
     return 0
-
-
-class _Progress:
-    """Prints the number of measured runs: continuously on a terminal, else every ten seconds."""
-
-    def __init__(self) -> None:
-        self._last = time.monotonic()
-
-    def __call__(self, done: int, runs: int) -> None:
-        terminal, now = sys.stderr.isatty(), time.monotonic()
-        if runs > 1 and (terminal or now - self._last > 10):
-            self._last = now
-            text = f"measured {done} of {runs} runs"
-            if terminal:
-                redraw(text, last=done == runs)
-            else:
-                print(text, file=sys.stderr, flush=True)
 
 
 def _groups(arguments: argparse.Namespace) -> Sequence[str]:

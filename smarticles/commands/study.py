@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from dem.display import progress_of
 from dem.errors import InputError
 from smarticles.command_line import Commands, add_options, columns
 from smarticles.measuring import follows
@@ -123,7 +124,16 @@ def compute_and_analyse(
         results = folder.path / "results"
         # All runs are passed, since tables list unfinished runs as missing.
         runs = [folder.run(entry) for entry in folder.entries]
-        report = load().analyse(runs, results, note=note, full=full, command=arguments.command_line, earlier=earlier)
+        with progress_of("analysing") as progress:
+            report = load().analyse(
+                runs,
+                results,
+                note=note,
+                full=full,
+                command=arguments.command_line,
+                earlier=earlier,
+                progress=progress,
+            )
         figures = [f"figure: {path}" for path in report.files.values() if path.suffix == ".png"]
         origin = f"tables, and the origin of every number: {report.output}"
         print(columns(report.header, report.rows), "", *report.lines, "", *figures, origin, sep="\n", flush=True)

@@ -23,7 +23,7 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> Wall:
 
 
 def test_file_states_how_far_the_run_is(tmp_path: Path, wall: Wall) -> None:
-    bar = ProgressWriter(tmp_path, 270, show=False)
+    bar = ProgressWriter(tmp_path, 270)
     bar.begin(phase="shake", start=3.0, time=3.0, end=8.0)
     wall.now += 5
     bar.update(time=4.5, phi=0.123, count=270)
@@ -45,7 +45,7 @@ def test_a_checkpoint_is_reported_at_once(tmp_path: Path, wall: Wall) -> None:
         data = json.loads((tmp_path / "progress.json").read_text())
         return data["time_s"], data.get("checkpoint_s")
 
-    bar = ProgressWriter(tmp_path, 2, show=False)
+    bar = ProgressWriter(tmp_path, 2)
     bar.begin(phase="relax", start=0.0, time=0.0, end=1.0)
     bar.checkpointed(0.1)  # nothing else is known yet
     assert not (tmp_path / "progress.json").exists()
@@ -61,7 +61,7 @@ def test_a_checkpoint_is_reported_at_once(tmp_path: Path, wall: Wall) -> None:
 
 
 def test_at_most_once_per_second_and_at_once_in_a_new_phase(tmp_path: Path, wall: Wall) -> None:
-    bar = ProgressWriter(tmp_path, 2, show=False)
+    bar = ProgressWriter(tmp_path, 2)
     bar.begin(phase="relax", start=0.0, time=0.0, end=1.0)
 
     def written(time: float) -> bool:
