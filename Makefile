@@ -19,7 +19,7 @@ setup: ## install everything into the system and .venv (first time on a bare sys
 setup-mpi: setup ## install LAMMPS and Open MPI besides, for engine: lammps (a minute)
 	@setup/install.sh --mpi
 
-demo: setup ## one pile, three procedures: a picture, and a figure among published numbers (75 s)
+demo: setup ## one pile, three procedures: a picture, and a figure among published numbers (1 min)
 	$(BIN)/smarticles sweep studies/demo/sweep.yaml --out out/demo-$(STAMP) --submit local
 	$(BIN)/python -m studies.demo out/demo-$(STAMP)
 

@@ -12,8 +12,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from dem.display import progress_of
 from dem.errors import InputError
 from dem.record.run import Run, open_run
+from dem.terminal import folded, printable, screen_width
 from postprocess.pictures.canvas import Style, Subject
 from postprocess.pictures.render import pictures
 from postprocess.report import figures as style
@@ -136,9 +138,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
         runs = runs_of(directory, published)
     except InputError as error:
         parser.error(str(error))
-    compared = Compared(pd.DataFrame([procedure_row(run) for run in runs]), published)
-    print(f"picture: {picture(runs, directory / 'picture.png')}", flush=True)
-    print(f"figure: {compared.draw(directory / 'figure')}", *compared.sentences(), sep="\n")
+    with progress_of("drawing"):
+        compared = Compared(pd.DataFrame([procedure_row(run) for run in runs]), published)
+        drawn, figure = picture(runs, directory / "picture.png"), compared.draw(directory / "figure")
+    with printable():
+        for line in (f"picture: {drawn}", f"figure: {figure}", *compared.sentences()):
+            print(folded(line, width=screen_width()))
 
 
 if __name__ == "__main__":
