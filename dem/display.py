@@ -246,7 +246,7 @@ class _Counted:
         if what != self._what:
             self._what, self._began, self._first = what, now, done
         since, left = done - self._first, None
-        if since > 0:
+        if since > 0 and done < total:  # after the last part, others may follow
             left = (now - self._began) * (total - done) / since
         fraction = done / total if total else None
         self._display.update(Row(label=what, fraction=fraction, detail=f"{done} of {total}", left_s=left))

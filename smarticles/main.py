@@ -136,7 +136,8 @@ def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
     except KeyboardInterrupt as error:
-        _complain(f"stopped; {str(error) or 'all written files are complete'}", error, debug)
+        what = str(error) or "all written files are complete; repeat the command to go on"
+        _complain(f"stopped; {what}", error, debug)
         return STOPPED
     except Exception as error:  # reported as an internal error
         text, status = _explain(error)
