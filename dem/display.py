@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager, contextmanager, redirect_stderr
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self, TextIO, cast
 
-from dem.terminal import bare, escaped, spelling
+from dem.terminal import bare, escaped, folded, spelling
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -152,7 +152,7 @@ class Display:
         """Write a line that stays, above the rows."""
         self._spoken = True
         if self._live is not None:
-            self._live.console.print(escaped(line), soft_wrap=True)
+            self._live.console.print(folded(escaped(line), width=self._live.console.width), soft_wrap=True)
         else:
             print(escaped(line), file=self._stream, flush=True)
 
@@ -246,7 +246,7 @@ class _Counted:
         if what != self._what:
             self._what, self._began, self._first = what, now, done
         since, left = done - self._first, None
-        if since > 0:
+        if since > 0 and done < total:  # after the last part, others may follow
             left = (now - self._began) * (total - done) / since
         fraction = done / total if total else None
         self._display.update(Row(label=what, fraction=fraction, detail=f"{done} of {total}", left_s=left))

@@ -68,7 +68,7 @@ def test_bad_usage_is_status_2_and_one_line(words: list[str], wrong: str, way_ou
     [
         (InputError("count: -1"), 2, "error: count: -1"),
         (RunError("left through\n the wall"), 1, "error: left through the wall"),
-        (KeyboardInterrupt(), 130, "stopped; all written files are complete"),
+        (KeyboardInterrupt(), 130, "stopped; all written files are complete; repeat the command to go on"),
         (KeyboardInterrupt("go on with: x"), 130, "stopped; go on with: x"),
         (
             OSError(28, "No space left on device", "/d/x.csv"),
