@@ -220,6 +220,18 @@ def test_vertices_of_polydata_come_before_its_lines(tmp_path):
     np.testing.assert_allclose(found.segments, corners[[[0, 1], [1, 2], [3, 4]]])
 
 
+def test_all_arrays_of_a_legacy_file_are_read(tmp_path):
+    pytest.importorskip("pyvista")
+    arrays = "".join(
+        f"SCALARS {name} int 1\nLOOKUP_TABLE default\n{first} 5\n" for name, first in (("a", 1), ("body", 7))
+    )
+    (tmp_path / "a.vtk").write_text(
+        "# vtk DataFile Version 3.0\nrods\nASCII\nDATASET POLYDATA\nPOINTS 4 float\n0 0 0 1 0 0 1 0 0 2 0 0\n"
+        f"LINES 2 6\n2 0 1\n2 2 3\nCELL_DATA 2\n{arrays}"
+    )
+    assert read_centrelines(tmp_path / "a.vtk", unit="m").body.tolist() == [7, 5]
+
+
 def test_bodies_may_be_numbered_by_points(tmp_path):
     mesh = grid(np.eye(4, 3), [(LINE, [0, 1]), (LINE, [2, 3])])
     mesh.point_data["body"] = [4, 4, 4, 4]  # one body of two pieces
@@ -268,6 +280,6 @@ def test_grids_with_other_cells_and_damaged_files_are_rejected(tmp_path, capfd):
         assert "\n" not in str(error.value)
     # Cut off where a section ends, it is a valid file without cells, on which filters of VTK end the process.
     (tmp_path / "d.vtk").write_bytes(content[: content.index(b"CELLS")])
-    with pytest.raises(InputError, match="d.vtk: it holds no lines"):
+    with pytest.raises(InputError, match=r"d\.vtk: it holds no lines"):
         read_centrelines(tmp_path / "d.vtk", unit="m")
     assert capfd.readouterr() == ("", "")
