@@ -126,9 +126,9 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
     """
     before, rested, *acting = zip(positions, frames, strict=True)
     depths = np.array(
-        [[deepest(solid_of(kind, scene.particle, *pose)) for kind in (shape, "boxes")] for pose in acting]
+        [[deepest(solid_of(kind, scene.body, *pose)) for kind in (shape, "boxes")] for pose in acting]
     )
-    boxes, radius = scene.particle.boxes, scene.container.radius_m
+    boxes, radius = scene.body.boxes, scene.container.radius_m
 
     def packed(positions: Array, frames: Array) -> float:
         still = np.zeros_like(positions)

@@ -120,7 +120,7 @@ def test_ring_approaches_its_limit() -> None:
 def test_staple_of_right_angles_is_a_smarticle() -> None:
     straight = small({"engine": "links", "smarticle.aspect_ratio": 0.7})
     body = small({"engine": "links", "particle": {"shape": "staple", "crown_m": 0.0117, "leg_m": 0.7 * 0.0117}})
-    one, other = straight.particle, body.bodies[0]
+    one, other = straight.body, body.bodies[0]
     assert isinstance(one, Particle)
     assert isinstance(other, Kind)
     assert other.mass == pytest.approx(one.mass, rel=1e-14)
@@ -153,7 +153,7 @@ def test_mixtures_have_their_shares_and_lengths() -> None:
     assert mixture is not None
     names = np.array([kind.name for kind in mixture.kinds])[mixture.of]
     assert (names == "rod").sum() == 200
-    factors = scene.shapes[0].factors  # type: ignore[index]
+    factors = scene.particle[0].factors  # type: ignore[index]
     assert factors.mean() == pytest.approx(1.0, abs=1e-12)
     assert factors.std() == pytest.approx(0.2, rel=1e-12)
     lengths = np.array([kind.size for kind in mixture.kinds])[mixture.of][names == "rod"]
