@@ -9,7 +9,6 @@ from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import (
-    ConfigDict,
     Field,
     ModelWrapValidatorHandler,
     ValidationError,

@@ -157,7 +157,7 @@ def test_a_wrong_scene_is_an_input_error_in_one_line() -> None:
 
 @pytest.mark.parametrize(("vary", "message"), [
     ({"contact.frctn": [1]}, "vary: run frctn1: contact: unknown key 'frctn'"),
-    ({"phases.7.duration_s": [1]}, "vary: phases.7.duration_s: there is no '7' in the scene"),
+    ({"phases.7.duration_s": [1]}, "scene: phases.7.duration_s: there is no '7' in the scene"),
     ({"seed": [1, 1]}, "vary: repeats.seeds: a seed is given twice"),
 ])  # fmt: skip
 def test_errors_of_a_sweep_name_arguments_and_no_temporary_file(
