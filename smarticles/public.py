@@ -7,7 +7,7 @@ import re
 import shlex
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -168,8 +168,7 @@ def _scene_or_file(given: Scene | Mapping[str, Any] | Path | str) -> Scene | Pat
         return Path(given)
     if isinstance(given, Scene):
         return given
-    what = type(given).__name__
-    raise InputError(f"scene: got a {what}; give a Scene, its keys as a mapping, or the path of a scene file")
+    raise InputError(f"scene: {shown(given)} is none; give a Scene, its keys as a mapping, or the path of a scene file")
 
 
 def read(directory: Path | str) -> Run:
@@ -208,16 +207,16 @@ def _names(also: Sequence[str]) -> tuple[str, ...]:
 
 def _measures(given: Sequence[OwnMeasure]) -> list[FrameMeasure]:
     """Return measures, made from functions where they are functions; InputError if one is neither."""
-    for one in [given] if isinstance(given, str) or not isinstance(given, Iterable) else given:
+    if callable(given):
+        raise InputError(f"measures: {shown(given)} is no list; write it in brackets, measures=[…]")
+    for one in [given] if isinstance(given, str) else given:
         if isinstance(one, str):
             raise InputError(
-                f"measures: {one!r} is text; tables have the columns of all measures, those on request by also; give "
-                "functions of a frame and its run here"
+                f"measures: {one!r} is text; give functions of a frame and its run; tables have all other measures "
+                "anyway, and those on request by also=[…]"
             )
         if not isinstance(one, FrameMeasure) and not hasattr(one, "__name__"):
-            raise InputError(f"measures: {shown(one)} is no function with a name; define one, def top_m(frame, run)")
-        if one is given:
-            raise InputError(f"measures: {one.__name__} is no list; give [{one.__name__}]")
+            raise InputError(f"measures: {shown(one)} is no function with a name; write one, `def top_m(frame, run)`")
     return [measure_of(one) for one in given]
 
 

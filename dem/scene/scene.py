@@ -47,7 +47,9 @@ from dem.strict import explained
 # Distance of neighbouring spheres, in diameters, of the chains that represent smooth links in pours and pictures. Where
 # such chains do not overlap, the links themselves overlap by a thirtieth of a diameter at most.
 SMOOTH_PITCH = 0.35
-SCHEMA_VERSION = 2  #: Version of the format of scenes; version 1, which is read too, has another default engine
+SCHEMA_VERSION: Literal[2] = (
+    2  #: Version of the format of scenes; version 1, which is read too, has another default engine
+)
 ENGINE_OF_VERSION_1 = "yade"
 P = TypeVar("P", bound=Part)
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
@@ -200,6 +202,13 @@ class Scene(Part):
     @classmethod
     def _one_or_many(cls, value: Any) -> Any:
         return listed(value)
+
+    @field_validator("particle")
+    @classmethod
+    def _of_some_body(cls, value: tuple[AnyShape, ...] | None) -> tuple[AnyShape, ...] | None:
+        if value is not None and all(shape.absent for shape in value):
+            raise ValueError("all shares are 0, so that no body has a shape; give one of them a share above 0")
+        return value
 
     @field_validator("hooks", mode="before")
     @classmethod
@@ -425,7 +434,10 @@ class Scene(Part):
         rng = np.random.default_rng(self.seed_for("shapes"))
         kinds: list[Kind] = []
         of: list[Numbers] = []
-        for shape, number in zip(self.particle, numbers_of_shapes(self.particle, self.count), strict=True):
+        shapes, numbers = self.particle, numbers_of_shapes(self.particle, self.count)
+        for shape, number in zip(shapes, numbers, strict=True):
+            if shape.absent:
+                continue
             of.append(len(kinds) + rng.integers(len(shape.factors), size=number))
             kinds += [self._kind(shape, float(factor)) for factor in shape.factors]
         order = np.concatenate(of)
@@ -492,7 +504,7 @@ def _sizes(given: Mapping[str, Any]) -> tuple[float, float]:
     `given` are parts of the scene that are validated already, by their names in the model.
     """
     if given.get("particle"):
-        bars = [shape.bars() for shape in given["particle"]]
+        bars = [shape.bars() for shape in given["particle"] if not shape.absent]
         return max(float(each.lengths.max()) for each in bars), min(each.thickness_in_plane for each in bars)
     smarticle = given.get("smarticle") or Smarticle()
     return smarticle.middle_length_m, smarticle.thickness_in_plane_m

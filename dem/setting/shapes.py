@@ -50,9 +50,12 @@ class Shaped(Part):
     diameter_m: Length | None = Field(None, description="diameter of a round section [m]; default: a flat section")
     density_kg_per_m3: Density = Field(7850.0, description="density [kg/m³]; mass and inertia are those of the bars")
     share: float | None = Field(
-        None, gt=0, le=1e6, description="part of all bodies that have this shape, relative to other shapes [1]"
+        None,
+        ge=0,
+        le=1e6,
+        description="part of all bodies that have this shape, relative to other shapes [1]; 0: none has it",
     )
-    count: int | None = Field(None, ge=1, le=100_000, description="bodies of this shape, instead of a share [1]")
+    count: int | None = Field(None, ge=0, le=100_000, description="bodies of this shape, instead of a share [1]")
     spread: float = Field(
         0.0,
         ge=0,
@@ -73,6 +76,11 @@ class Shaped(Part):
         except InputError as error:
             raise ValueError(f"shape: {self.tag()}: {error}") from None
         return self
+
+    @property
+    def absent(self) -> bool:
+        """Whether the scene says that no body has this shape."""
+        return self.share == 0 or self.count == 0
 
     @property
     def factors(self) -> Array:

@@ -71,6 +71,11 @@ def variables(vary: Mapping[str, Any], zipped: Mapping[str, Any]) -> list[Variab
     if both := [key for key in vary if key in zipped]:
         raise InputError(f"zip: {both[0]}: is in vary, too; leave it out of one of them")
     keys = [*zipped, *vary]
+    for key in keys:
+        if inner := [other for other in keys if other.startswith(f"{key}.")]:
+            raise InputError(
+                f"{'zip' if inner[0] in zipped else 'vary'}: {inner[0]}: is part of {key}, which varies, too"
+            )
     last = [key.rpartition(".")[2] for key in keys]
     names = {
         key: word if last.count(word) == 1 and not word.isdigit() else key.replace(".", "_")
@@ -96,13 +101,14 @@ def _variable(source: str, key: str, name: str, given: Any) -> Variable:
     if isinstance(given, set | frozenset):
         raise InputError(f"{where}: {shown(given)} has no order; give a list")
     named = given if isinstance(given, Mapping) else None
-    values = [_value(where, key, value) for value in (given if named is None else named.values())]
-    if not values:
+    listed = list(given if named is None else named.values())
+    if not listed:
         raise InputError(f"{where}: has no values; give one at least")
     if named is not None and key == SEED:
-        raise InputError(f"{where}: seeds have no names; give a list, e.g. {list(named.values())}")
-    for value in values if named is None else named:
+        raise InputError(f"{where}: seeds have no names; give a list, e.g. {listed}")
+    for value in listed if named is None else named:
         _check_for_run_names(where, key, value, named is not None)
+    values = [_value(where, key, value) for value in listed]
     if named is None:
         return Variable(source=source, key=key, name=name, values=values)
     return Variable(source=source, key=key, name=name, values=list(named), named=dict(zip(named, values, strict=True)))
@@ -130,8 +136,8 @@ def _check_for_run_names(where: str, key: str, value: Value, is_name: bool) -> N
     """Raise InputError if a value, or the name of a value, cannot be part of the names of runs."""
     if is_name and not (isinstance(value, str) and value and _IN_A_NAME.match(value)):
         raise InputError(f"{where}: {shown(value)} cannot name a value; use letters, digits and . _ + = -")
-    items = value if isinstance(value, list) else [value]
-    if any(isinstance(item, dict | list) or not _IN_A_NAME.match(str(item)) for item in items):
+    items = value if isinstance(value, list | tuple) else [value]
+    if any(isinstance(item, Mapping | list | tuple | BaseModel) or not _IN_A_NAME.match(str(item)) for item in items):
         raise InputError(
             f"{where}: {shown(value)} cannot be part of the name of a run; give values with names, "
             f"{{{key!r}: {{'NAME': VALUE, …}}}}"
