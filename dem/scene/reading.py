@@ -1,5 +1,6 @@
 """Read scenes from files, change their keys by `--set`, and write, hash and compare scenes."""
 
+import copy
 import hashlib
 import json
 import os
@@ -97,9 +98,39 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     if problem:
         raise InputError(f"{path}: {problem}; {way_out}")
     data = parse_yaml(text, str(path))
-    for override in overrides if isinstance(data, Mapping) else ():
+    if not isinstance(data, Mapping):
+        return parse_scene(data, source=str(path))
+    changed = copy.deepcopy(data)
+    for override in overrides:
+        apply_override(changed, override)
+    try:
+        return parse_scene(changed, source=str(path), folder=path.parent)
+    except InputError as error:
+        culprit = _culprit(data, overrides, path.parent)
+        if culprit is None:
+            raise
+        raise InputError(f"--set {culprit}: {str(error).removeprefix(f'{path}: ')}") from None
+
+
+def _culprit(data: Any, overrides: Sequence[str], folder: Path) -> str | None:
+    """Return the last override with which a valid scene became invalid; None if there is none.
+
+    `data` is changed in place.
+    """
+
+    def is_valid() -> bool:
+        try:
+            parse_scene(data, source="", folder=folder)
+        except InputError:
+            return False
+        return True
+
+    culprit, valid = None, bool(overrides) and is_valid()
+    for override in overrides:
         apply_override(data, override)
-    return parse_scene(data, source=str(path), folder=path.parent)
+        before, valid = valid, is_valid()
+        culprit = override if before and not valid else culprit
+    return culprit
 
 
 def apply_override(data: Any, override: str) -> None:

@@ -15,6 +15,7 @@ from dem.body.linkage import Linkage, layout_of, link_of
 from dem.errors import InputError, nearest, shown
 from dem.setting.joints import AnyJoint
 from dem.setting.part import LONGEST_LENGTH, Density, Length, Part, Stiffness, as_list
+from dem.strict import in_radians
 
 SIZES = 16  # equally frequent lengths that stand in for a spread of lengths
 NORMAL, IN_PLANE = 1.27e-3, 0.5e-3  # m, the section of the paper's smarticles
@@ -74,7 +75,8 @@ class Shaped(Part):
             for factor in self.factors[[0, -1]]:
                 _ = self.bars(float(factor))
         except InputError as error:
-            raise ValueError(f"shape: {self.tag()}: {error}") from None
+            smallest = min(np.ravel(getattr(self, "angle_deg", 0.0)), key=abs)
+            raise ValueError(f"shape: {self.tag()}: {error}{in_radians(smallest)}") from None
         return self
 
     @property

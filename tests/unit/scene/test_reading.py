@@ -91,10 +91,16 @@ def test_file_that_is_no_yaml(tmp_path: Path) -> None:
         ),
         ("count.x=1", "--set count.x=1: there is no 'x' in the scene; lists are numbered from 0"),
         ("seed=[1", "--set seed=[1: the value is not valid YAML"),
-        ("smarticle.w=1", "bad.yaml: smarticle: unknown key 'w'; known keys: "),
-        ("gravity_m_per_s2=yes", "bad.yaml: gravity_m_per_s2: got the boolean true, expected a number"),
-        ("smarticle.middle_length_m=11.7", f"bad.yaml: {W_IN_MM}"),
-        ("contact.friction_wall=.nan", "bad.yaml: contact.friction_wall: nan is not a finite number; give one"),
+        ("smarticle.w=1", "--set smarticle.w=1: smarticle: unknown key 'w'; known keys: "),
+        (
+            "gravity_m_per_s2=yes",
+            "--set gravity_m_per_s2=yes: gravity_m_per_s2: got the boolean true, expected a number",
+        ),
+        ("smarticle.middle_length_m=11.7", f"--set smarticle.middle_length_m=11.7: {W_IN_MM}"),
+        (
+            "contact.friction_wall=.nan",
+            "--set contact.friction_wall=.nan: contact.friction_wall: nan is not a finite number; give one",
+        ),
     ],
 )
 def test_bad_override(tmp_path: Path, override: str, expected: str) -> None:
