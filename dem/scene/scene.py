@@ -122,6 +122,17 @@ class Scene(Part):
     # Tells pydantic that files are validated without this method, which would lose the folder of relative paths.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
 
+    def __eq__(self, other: object) -> bool:
+        """Return whether all keys are equal; pydantic would compare cached properties, too, with their arrays."""
+        return isinstance(other, Scene) and self._values == other._values
+
+    def __hash__(self) -> int:
+        return hash(self._values)
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, name) for name in type(self).model_fields)
+
     def __setattr__(self, name: str, value: Any) -> None:
         """Raise InputError: a scene is not changed after it was checked."""
         raise InputError(f"{name}: a scene cannot be changed; make another one, by scene.replace({name}=…)")
@@ -160,7 +171,8 @@ class Scene(Part):
     @classmethod
     def _of_this_version(cls, data: Any) -> Any:
         """Return the data of a scene of version 1 as data of `SCHEMA_VERSION`."""
-        if isinstance(data, Mapping) and type(version := data.get("schema_version")) is int and version == 1:
+        version = data.get("schema_version") if isinstance(data, Mapping) else None
+        if version == 1 and not isinstance(version, bool):
             return {"engine": ENGINE_OF_VERSION_1, **data, "schema_version": SCHEMA_VERSION}
         return data
 

@@ -106,9 +106,9 @@ def _variable(source: str, key: str, name: str, given: Any) -> Variable:
         raise InputError(f"{where}: has no values; give one at least")
     if named is not None and key == SEED:
         raise InputError(f"{where}: seeds have no names; give a list, e.g. {listed}")
+    values = [_value(where, key, value) for value in listed]
     for value in listed if named is None else named:
         _check_for_run_names(where, key, value, named is not None)
-    values = [_value(where, key, value) for value in listed]
     if named is None:
         return Variable(source=source, key=key, name=name, values=values)
     return Variable(source=source, key=key, name=name, values=list(named), named=dict(zip(named, values, strict=True)))

@@ -173,7 +173,30 @@ def test_numbers_of_shapes_add_up() -> None:
     assert numbers_of_shapes(counted, 7) == [3, 4]
 
 
+@pytest.mark.parametrize("none", [{"share": 0}, {"count": 0}])
+def test_a_shape_of_no_body_is_as_if_it_were_not_there(none: dict[str, int]) -> None:
+    rod, ring = {"shape": "rod", "length_m": 0.02}, {"shape": "ring", "radius_m": 0.004}
+    some = {"share": 1} if "share" in none else {"count": 10}
+    mixed, alone = (small({"particle": shapes}) for shapes in ([{**rod, **none}, {**ring, **some}], ring))
+    assert mixed.mixture is not None
+    assert alone.mixture is not None
+    assert [kind.name for kind in mixed.mixture.kinds] == ["ring"]
+    assert mixed.mixture.of.tolist() == alone.mixture.of.tolist() == [0] * 10
+    assert mixed.cylinder == alone.cylinder
+    assert mixed.phases == alone.phases
+
+
+def test_some_shape_has_a_body() -> None:
+    shapes = [{"shape": "rod", "length_m": 0.02, "share": 0}] * 2
+    with pytest.raises(InputError, match=r"particle: all shares are 0, .* give one of them a share above 0"):
+        small({"particle": shapes})
+
+
 BAD = {
+    "legs in radians": (
+        {"shape": "staple", "crown_m": 0.01, "leg_m": 0.004, "angle_deg": [90, 1.57]},
+        ["shape", "1.57 rad are 89.95 deg"],
+    ),
     "legs that cross": (
         {"shape": "staple", "crown_m": 0.01, "leg_m": 0.02, "angle_deg": 30},
         ["shape", "bars 0 and 2"],
