@@ -8,6 +8,7 @@ import shlex
 import signal
 import subprocess
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
@@ -58,6 +59,7 @@ _IN_PYTHON = (
 )
 
 
+_WARNING = "smarticles: warning: "  # begins warnings of the command
 _POLL_S = 0.25  # between two readings of the progress of a run
 
 
@@ -135,7 +137,8 @@ def run(
 ) -> Run:
     """Run a scene in a new process, as `smarticles run` does, and return the finished run.
 
-    A new process is needed because YADE and PyVista must not be loaded in one process.
+    A new process is needed because YADE and PyVista must not be loaded in one process. Its warnings, such as of values that
+    are probably mistakes, become warnings of Python.
 
     Args:
         scene: scene, its keys as a mapping, or path of a scene file.
@@ -172,6 +175,9 @@ def run(
             lines = lines or [f"exit status {status}, without a message"]
             text = lines[-1].removeprefix("smarticles: ").removeprefix("error: ")
             raise InputError(text) if status == BAD_INPUT else RunError(text)
+    for line in lines:
+        if line.startswith(_WARNING):
+            warnings.warn(line.removeprefix(_WARNING), stacklevel=2)
     return Run(Path(out))
 
 

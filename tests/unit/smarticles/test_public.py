@@ -224,6 +224,12 @@ def test_a_run_takes_the_keys_of_a_scene(tmp_path: Path) -> None:
     assert not (tmp_path / "b").exists()
 
 
+def test_warnings_of_a_run_are_warnings_of_python(tmp_path: Path) -> None:
+    scene = scene_of(fidelity="draft", smarticle={"angles_deg": [90, 1.57]})
+    with pytest.warns(UserWarning, match=r"^smarticle\.angles_deg: 1\.57 means 1\.57°, .* write 90$"):
+        smarticles.run(scene, tmp_path / "a")
+
+
 def test_errors_of_a_run_name_arguments(tmp_path: Path) -> None:
     with pytest.raises(smarticles.InputError) as raised:
         smarticles.run(scene_of(engine="links"), tmp_path / "a", resume=True)
