@@ -137,8 +137,8 @@ def run(
 ) -> Run:
     """Run a scene in a new process, as `smarticles run` does, and return the finished run.
 
-    A new process is needed because YADE and PyVista must not be loaded in one process. Its warnings, such as of values that
-    are probably mistakes, become warnings of Python.
+    A new process is needed because YADE and PyVista must not be loaded in one process. Its warnings,
+    such as of values that are probably mistakes, become warnings of Python.
 
     Args:
         scene: scene, its keys as a mapping, or path of a scene file.
