@@ -4,7 +4,8 @@ import copy
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -72,11 +73,14 @@ def _not_a_scene(data: Any) -> str | None:
     return None
 
 
-def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
+def load_scene(
+    path: Path | str, overrides: Sequence[str] = (), *, check: Callable[[Scene], object] = lambda _: None
+) -> Scene:
     """Return the scene of a file.
 
     Args:
         overrides: changes of keys as `KEY=VALUE`, e.g. `phases.1.duration_s=2`.
+        check: function that raises InputError for scenes to reject, besides those that are not valid.
 
     Raises:
         InputError: the file cannot be read or is not YAML, an override is wrong, or the scene is not valid.
@@ -98,32 +102,38 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     if problem:
         raise InputError(f"{path}: {problem}; {way_out}")
     data = parse_yaml(text, str(path))
-    if not isinstance(data, Mapping):
-        return parse_scene(data, source=str(path))
+
+    def checked(some: Any) -> Scene:
+        scene = parse_scene(some, source=str(path), folder=path.parent)
+        try:
+            check(scene)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        return scene
+
     changed = copy.deepcopy(data)
-    for override in overrides:
+    for override in overrides if isinstance(data, Mapping) else ():
         apply_override(changed, override)
     try:
-        return parse_scene(changed, source=str(path), folder=path.parent)
+        return checked(changed)
     except InputError as error:
-        culprit = _culprit(data, overrides, path.parent)
+        culprit = _culprit(data, overrides, checked) if isinstance(data, Mapping) else None
         if culprit is None:
             raise
         raise InputError(f"--set {culprit}: {str(error).removeprefix(f'{path}: ')}") from None
 
 
-def _culprit(data: Any, overrides: Sequence[str], folder: Path) -> str | None:
+def _culprit(data: Any, overrides: Sequence[str], checked: Callable[[Any], Scene]) -> str | None:
     """Return the last override with which a valid scene became invalid; None if there is none.
 
-    `data` is changed in place.
+    `checked` raises InputError for data of an invalid scene. `data` is changed in place.
     """
 
     def is_valid() -> bool:
-        try:
-            parse_scene(data, source="", folder=folder)
-        except InputError:
-            return False
-        return True
+        with suppress(InputError):
+            checked(data)
+            return True
+        return False
 
     culprit, valid = None, bool(overrides) and is_valid()
     for override in overrides:
