@@ -31,7 +31,7 @@ class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         paragraphs = text.split("\n\n")
         return "\n\n".join(
-            folded(paragraph, width=width)
+            folded(paragraph, width=shutil.get_terminal_size().columns)
             if re.search(r"^ ", paragraph, re.MULTILINE)
             else fill(paragraph, width, break_on_hyphens=False)
             for paragraph in paragraphs
