@@ -33,6 +33,20 @@ def test_examples_of_the_help_are_accepted(
         assert (parsed.command, unknown) == (command, [])
 
 
+@pytest.mark.parametrize(("words", "message"), [
+    (("view", "runs/a", "--color-by", "speed"), "unknown option --color-by; known: -h, --help, --debug, --port, "),
+    (("view", "runs/a", "--time", "1"), "unknown option --time; known: "),
+    (("view", "runs/a", "--prot", "1"), "unknown option --prot; did you mean '--port'?"),
+    (("export", "runs/a", "--to", "xyz"), "--to xyz: no such format; use gsd, a trajectory"),
+    (("export", "runs/a", "--to", ".PLY"), "--to .PLY: no such format; use glb or obj"),
+    (("export", "runs/a", "--to", "ro-creat"), "--to ro-creat: no such format; did you mean 'ro-crate'?"),
+])  # fmt: skip
+def test_a_wrong_word_gets_the_nearest_right_one(smarticles: Smarticles, words: tuple[str, ...], message: str) -> None:
+    said = smarticles(*words)
+    assert said.status == 2
+    assert message in said.err
+
+
 def test_help_lists_the_commands_and_the_exit_status(smarticles: Smarticles) -> None:
     said = smarticles("--help")
     assert said.status == 0
