@@ -27,13 +27,14 @@ COLOURS = {
     "wall": "#9db4c8",
     "floor": "#e9e9e7",
     "hooks": "#b3261e",
+    "plate": "#6d7f91",
     "strings": "#5b4636",
     "crossings": "#1a1a1a",
     "forces": "#a11a2e",
 }
 SIZE = [1000, 800]  # of pictures [pixel]
 NUMBER = "smarticle_id"  #: Field that colours planar runs
-KINDS = ("smarticles", "wall", "floor", "hooks", "strings", "crossings", "forces")
+KINDS = ("smarticles", "wall", "floor", "hooks", "plate", "strings", "crossings", "forces")
 
 
 def rgb(colour: str) -> list[float]:
@@ -169,6 +170,11 @@ def wall(kind: str, source: Any, view: Any) -> None:
     plain(kind, half, view).Opacity = 0.3
 
 
+def plate(kind: str, source: Any, view: Any) -> None:
+    """Show the plate, through which bodies are visible."""
+    plain(kind, source, view).Opacity = 0.35
+
+
 def strings(kind: str, source: Any, view: Any) -> None:
     """Show strings as thick lines."""
     plain(kind, source, view).LineWidth = 3.0
@@ -206,6 +212,7 @@ def forces(kind: str, source: Any, view: Any) -> None:
 SHOWERS: dict[str, Callable[[str, Any, Any], Any]] = {
     "smarticles": boxes,
     "wall": wall,
+    "plate": plate,
     "strings": strings,
     "crossings": arrows,
     "forces": forces,

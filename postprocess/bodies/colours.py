@@ -47,6 +47,7 @@ PAINTS: Mapping[str, Paint] = MappingProxyType(
         "wall": Paint("#9db4c8", 0.22),
         "floor": Paint("#e9e9e7"),
         "hooks": Paint("#b3261e"),
+        "plate": Paint("#6d7f91", 0.35),
         "strings": Paint("#5b4636"),
         "crossings": Paint("#1a1a1a"),
         "forces": Paint("#a11a2e"),

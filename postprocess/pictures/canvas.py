@@ -163,7 +163,7 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
             plotter.renderer.remove_actor(name, render=False)
     for kind, mesh in meshes.items():
         options = {"name": kind, "reset_camera": False, "render": False, "culling": False}
-        if kind in {"wall", "floor", "ghost"}:
+        if kind in {"wall", "floor", "plate", "ghost"}:
             # Coinciding points would be drawn as edges.
             edges = mesh.clean(tolerance=1e-6).extract_feature_edges(feature_angle=30, manifold_edges=False)
             opacity = 0.3 if kind == "ghost" else 1.0
@@ -179,7 +179,8 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
             options |= {"show_edges": boxes, "edge_color": "#101418", "edge_opacity": 0.55, "line_width": _OVERSAMPLING}
         elif kind != "ghost":
             grazed = kind == "floor"  # light at grazing incidence would leave it black
-            options |= {"color": PAINTS[kind].colour, "opacity": PAINTS[kind].opacity, "lighting": kind != "wall"}
+            lit = kind not in {"wall", "plate"}
+            options |= {"color": PAINTS[kind].colour, "opacity": PAINTS[kind].opacity, "lighting": lit}
             options |= {"ambient": 0.45 if grazed else 0.25, "diffuse": 0.6 if grazed else 0.8}
         if kind != "ghost":
             plotter.add_mesh(mesh, **options)
