@@ -1,4 +1,4 @@
-"""Show an exported run in ParaView: bodies coloured by crossings, kinds or contacts, and the wall cut open.
+"""Show an exported run in ParaView: bodies coloured by crossings, entries or contacts, and the wall cut open.
 
     paraview --script=show_in_paraview.py                     in ParaView's window; then press play
     pvpython show_in_paraview.py FOLDER --picture last.png    a picture of the last frame, without a window
@@ -149,10 +149,10 @@ def colouring(source: Any) -> str:
     fields = source.CellData
     if fields.GetArray("crossings") is None:  # the run is planar
         return NUMBER
-    kind = fields.GetArray("kind")
-    if kind is None:
+    entry = fields.GetArray("entry")
+    if entry is None:
         return "crossings"
-    return "kind" if kind.GetRange()[1] > 0 else "contacts"
+    return "entry" if entry.GetRange()[1] > 0 else "contacts"
 
 
 def wall(kind: str, source: Any, view: Any) -> None:

@@ -46,6 +46,9 @@ _EDGE = "#7d8f9f"
 _PALE = 0.15  # opacity of smarticles if forces are drawn
 # In `Style.unit`: height of the captions, of scale and colour bar, margin, size of title and text.
 _HEAD, _FOOT, _MARGIN, _TITLE, _TEXT = 11.5, 10.0, 2.6, 2.5, 1.9
+_LEFT_OF_BAR, _MOST_OF_WIDTH = 0.45, 0.97  # left and right end of colour bar and legend, over the panel's width
+_LEGEND_TOP = 7.6  # height of the legend's title, in `Style.unit`
+_LEGEND_ROWS, _LEGEND_COLUMNS = 3, 3
 _LEAST_UNIT = 4.4  # so that text stays readable [pixel]
 _LETTER = 0.62  # width of a letter over its height
 _LIGHTS = ((-0.6, 1.1, 0.85), (0.9, 0.35, 0.32), (0.0, 0.0, 0.25))  # right, up, intensity
@@ -191,7 +194,7 @@ class Canvas:
 
     RunError if this machine lacks the libraries to draw without a display. The extent (2, 2) in the camera's view is in
     [mm]. The link size of `run` sets the range of the shading of corners (ambient occlusion), which takes most of the
-    time of a picture and is left out by `quick`. Without `scale` there is no colour bar.
+    time of a picture and is left out by `quick`. Without `scale` there is neither colour bar nor legend.
     """
 
     def __init__(
@@ -233,8 +236,11 @@ class Canvas:
                         kernel_size=64, blur=True,
                     )  # fmt: skip
             self.turn(style.axes)
+            self._swatches: list[tuple[tuple[float, float], tuple[int, ...]]] = []  # lower left [pixel] and colour
             if scale is not None and scale.colours is not None:
                 self._add_colour_bar(scale, scale.colours)
+            elif scale is not None and scale.labels:
+                self._add_legend(scale)
             self._length = round_length(0.2 * style.size[0] * self.pixel)
             at = self._bar[2] + style.unit, self._bar[3]
             self._write(0, "scale", f"{self._length:g} mm", at, _TEXT)
@@ -295,20 +301,32 @@ class Canvas:
             self._plotter.render()
             image = Image.fromarray(self._plotter.screenshot(return_img=True)).reduce(_OVERSAMPLING)
         left, top, right, bottom = self._bar
-        ImageDraw.Draw(image).rectangle((left, self.size[1] - top, right, self.size[1] - bottom), fill=figures.BLACK)
+        draw = ImageDraw.Draw(image)
+        draw.rectangle((left, self.size[1] - top, right, self.size[1] - bottom), fill=figures.BLACK)
+        side = _TEXT * self._style.unit
+        for (x, y), colour in self._swatches:
+            draw.rectangle((x, self.size[1] - y - side, x + side, self.size[1] - y), fill=colour)
         return image
 
     def _write(
-        self, column: int, name: str, text: str, at: tuple[float, float], size: float, *, bold: bool = False
+        self,
+        column: int,
+        name: str,
+        text: str,
+        at: tuple[float, float],
+        size: float,
+        *,
+        bold: bool = False,
+        width: float = math.inf,
     ) -> None:
         """Write a line at a position from the lower left [pixel]; shrink or cut it if it is too long.
 
         `column` is the number of the run, from the left; `size` is the font size, over `Style.unit`. A new line
-        replaces the line with its `name`.
+        replaces the line with its `name`. `width` is the longest line [pixel]; none is longer than to the right edge.
         """
-        (x, y), width = at, self._style.size[0]
+        x, y = at
         text = "".join(letter if letter.isprintable() else "?" for letter in text)
-        points, room = size * self._style.unit, (width - x) / _LETTER
+        points, room = size * self._style.unit, min(width, self._style.size[0] - x) / _LETTER
         points = min(points, max(room / max(len(text), 1), 0.6 * points))
         if len(text) * points > room:
             text = f"{text[: int(room / points) - 1]}…"
@@ -328,10 +346,30 @@ class Canvas:
         self._plotter.subplot(0, self._columns - 1)
         self._plotter.add_scalar_bar(
             self._style.field.title, mapper=mapper, vertical=False, n_labels=0, color=figures.BLACK, render=False,
-            position_x=0.45, position_y=3.2 * self._style.unit / height, width=0.52,
+            position_x=_LEFT_OF_BAR, position_y=3.2 * self._style.unit / height, width=_MOST_OF_WIDTH - _LEFT_OF_BAR,
             height=5.6 * self._style.unit / height,
             title_font_size=round(_TEXT * unit), label_font_size=round(_TEXT * unit), use_opacity=False,
         )  # fmt: skip
+
+    def _add_legend(self, scale: ColourScale) -> None:
+        """Write the names of values with their colours in columns below the picture; too many names are cut."""
+        unit, (wide, _), last = self._style.unit, self._style.size, self._columns - 1
+        left, line = _LEFT_OF_BAR * wide, 1.2 * _TEXT * unit
+        names, most = list(scale.labels.items()), _LEGEND_ROWS * _LEGEND_COLUMNS
+        shown = names if len(names) <= most else names[: most - 1]
+        columns = math.ceil(min(len(names), most) / _LEGEND_ROWS)
+        width = (_MOST_OF_WIDTH - _LEFT_OF_BAR) * wide / columns
+        top = _LEGEND_TOP * unit
+        self._write(last, "legend", self._style.field.title, (left, top), _TEXT)
+        for number in range(min(len(names), most)):
+            x, y = left + number // _LEGEND_ROWS * width, top - (1 + number % _LEGEND_ROWS) * line
+            text = f"and {len(names) - len(shown)} more"
+            if number < len(shown):
+                value, text = shown[number]
+                colour = tuple(scale.painted(np.array(value)).tolist())
+                self._swatches.append(((x + last * wide, y), colour))
+            indent = 1.5 * _TEXT * unit
+            self._write(last, f"legend {number}", text, (x + indent, y), _TEXT, width=width - 1.2 * indent)
 
 
 def round_length(most: float) -> float:

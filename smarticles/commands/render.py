@@ -43,8 +43,8 @@ def add(commands: Commands) -> None:
         render_run,
         summary="draw a picture or a film of a run",
         text="""
-Draws the boxes of all smarticles, the cylinder cut open in front, hooks, strings and a scale bar. No
-display is needed. The suffix of the output chooses between a picture (.png) and a film (.gif, .webp,
+Draws the boxes of all smarticles, the cylinder cut open in front, hooks, plate, strings and a scale
+bar. No display is needed. The suffix of the output chooses between a picture (.png) and a film (.gif, .webp,
 .mp4). A film plays at a constant speed, which is written on it.""",
         examples="""\
   smarticles render runs/a                                   last frame, runs/a/render.png
@@ -70,7 +70,8 @@ display is needed. The suffix of the output chooses between a picture (.png) and
         render,
         "--color-by",
         help="crossings (default; number of links of others through the smarticle's plane), contacts, height, speed, "
-        "id (default for motion in a plane), or another field of `smarticles export`, such as local_packing_fraction",
+        "id (default for motion in a plane), entry (of the scene's list particle; default for mixtures), or another "
+        "field of `smarticles export`, such as local_packing_fraction",
     )
     render.add_argument(
         "--clim",
