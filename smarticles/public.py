@@ -37,6 +37,8 @@ from templates.sweep.sweep_file import SEED
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+    from postprocess.report.series import Chart
+
 #: A measure, or a function of a frame and its run, whose name ends with the unit of its value: `top_m`
 OwnMeasure = FrameMeasure | Callable[[Frame, Run], float]
 
@@ -173,17 +175,43 @@ def measure(
     return measured([directory], frames=frames, also=also, measures=[measure_of(one) for one in measures])
 
 
-def plot(run: Run | Path | str, *, time: float | None = None, color_by: str | None = None) -> Image:
-    """Draw the pile of a run, as `smarticles render` does; a notebook shows the picture.
+@overload
+def plot(
+    run: Run | Path | str, series: None = None, *, time: float | None = None, color_by: str | None = None
+) -> Image: ...
+@overload
+def plot(run: Run | Path | str, series: str | Sequence[str]) -> Chart: ...
+def plot(
+    run: Run | Path | str,
+    series: str | Sequence[str] | None = None,
+    *,
+    time: float | None = None,
+    color_by: str | None = None,
+) -> Image | Chart:
+    """Draw the pile of a run, or recorded series against time, as `smarticles render` does; a notebook shows it.
 
     Args:
         run: run, or its directory.
+        series: name of a series, such as "com_height_m", or several names; None: the pile.
         time: simulated time [s] of the frame, the nearest one; None: the last frame.
         color_by: field that colours the smarticles; None: the default of `smarticles render`.
 
+    Returns:
+        The picture of the pile; for series a figure of Matplotlib with phases as bands, whose
+        `savefig("height.pdf")` writes PDF, SVG or PNG.
+
     Raises:
-        InputError: the directory is not a run directory, the run has no frames yet, or the field does not exist.
+        InputError: the directory is not a run directory, the run has no frames or no series yet, or the field or series
+            does not exist.
     """
+    if series is not None:
+        for name, value in (("time", time), ("color_by", color_by)):
+            if value is not None:
+                raise InputError(f"{name}: is for pictures of the pile, and series are drawn; leave one of them out")
+        from postprocess.report.series import draw_series  # noqa: PLC0415  (of the extra "viz")
+
+        opened = open_run(run.path if isinstance(run, Run) else run)
+        return draw_series(opened, [series] if isinstance(series, str) else list(series))
     from PIL import Image as images  # noqa: N813, PLC0415  (of the extra "viz")
 
     from postprocess.pictures.render import render_run  # noqa: PLC0415
