@@ -63,6 +63,7 @@ if not TYPE_CHECKING:  # hidden from type checkers, which would accept any name
 
             value = version("smarticles")
         elif name in __all__:
+            import_module("smarticles.notebook")  # which registers how notebooks show what the names give
             value = getattr(import_module(_MODULES.get(name, "smarticles.public")), name)
         else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}; known: {', '.join(sorted(__all__))}")

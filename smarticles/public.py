@@ -28,6 +28,7 @@ from dem.yaml_text import load_yaml, read_text
 from postprocess.measures.registry import FrameMeasure, measure_of
 from smarticles.main import BAD_INPUT
 from smarticles.measuring import grouped, measured
+from smarticles.notebook import show_sweep
 from smarticles.sweeps import compute, make_folder, raise_failures
 from templates.local import environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
@@ -73,6 +74,9 @@ class SweepDirectory(Sequence[Run]):
 
     def __len__(self) -> int:
         return len(self.folder.entries)
+
+    def _repr_html_(self) -> str:
+        return show_sweep(self.path, self[:], self.values)
 
     @overload
     def __getitem__(self, index: int) -> Run: ...

@@ -154,11 +154,13 @@ def union(extents: Sequence[Floats]) -> Floats:
     return np.stack([np.min(extents, axis=0)[0], np.max(extents, axis=0)[1]])
 
 
-def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, colours: NDArray[np.uint8]) -> None:
+def add_bodies(
+    plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame | None, colours: NDArray[np.uint8]
+) -> None:
     """Draw the meshes of a frame in a window of PyVista, in place of all bodies drawn before.
 
     `meshes` are the meshes by kind, as of `visible_meshes`. `colours` (N, 3, 3) uint8 are the sRGB colours of the
-    links.
+    links; without a frame they are those of the cells of the smarticles, (C, 3).
     """
     pale = "forces" in meshes
     for kind in (*PAINTS, "ghost"):
@@ -173,7 +175,7 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
             line = {"color": _EDGE, "line_width": 1.8 * _OVERSAMPLING, "lighting": False, "opacity": opacity}
             plotter.add_mesh(edges, **(options | line | {"name": f"{kind} edges"}))
         if kind == "smarticles":
-            mesh.point_data["colour"] = at_points(mesh, colours[owners(mesh, frame)])
+            mesh.point_data["colour"] = at_points(mesh, colours if frame is None else colours[owners(mesh, frame)])
             options |= {"scalars": "colour", "rgb": True, "opacity": _PALE if pale else 1.0, "specular": 0.12}
             # Hidden back faces would take a quarter of a film's time.
             options |= {"culling": not pale and "back", "ambient": 0.22, "diffuse": 0.85, "specular_power": 20}
@@ -194,14 +196,15 @@ class Canvas:
 
     RunError if this machine lacks the libraries to draw without a display. The extent (2, 2) in the camera's view is in
     [mm]. The link size of `run` sets the range of the shading of corners (ambient occlusion), which takes most of the
-    time of a picture and is left out by `quick`. Without `scale` there is neither colour bar nor legend.
+    time of a picture; it is left out by `quick`, or without a run. Without `scale` there is neither colour bar nor
+    legend.
     """
 
     def __init__(
         self,
         style: Style,
         extent: Floats,
-        run: Run,
+        run: Run | None,
         *,
         columns: int = 1,
         scale: ColourScale | None = None,
@@ -229,7 +232,7 @@ class Canvas:
                 for aside, rise, strength in _LIGHTS:
                     lamp = pv.Light(position=(aside, rise, 1.0), intensity=strength, light_type="camera light")
                     plotter.add_light(lamp, only_active=True)
-                if not quick:
+                if run is not None and not quick:
                     plotter.enable_ssao(
                         radius=0.6 * run.manifest.middle_length_m * MILLIMETRE,
             bias=0.4 * run.manifest.thickness_in_plane_m * MILLIMETRE,
@@ -272,12 +275,12 @@ class Canvas:
     def show(
         self,
         column: int,
-        frame: Frame,
+        frame: Frame | None,
         meshes: Mapping[str, pv.PolyData],
         colours: NDArray[np.uint8],
         caption: Sequence[str] = (),
     ) -> None:
-        """Show the meshes of a frame in a panel, with colours of the links, sRGB (N, 3, 3), uint8.
+        """Show the meshes of a frame in a panel, with colours as for `add_bodies`.
 
         The first line of the caption is the title.
         """
