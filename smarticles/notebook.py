@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 import sys
 from collections.abc import Callable, Sequence
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,7 @@ from dem.scene.scene import Scene
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-_SIDE = 440  # of a picture of one run [pixel]
+_SIDE, _WIDEST = 500, 1000  # side of a picture of one run, and width of one of several [pixel]
 _MOST_BYTES = 45_000  # of a picture; base64 makes it a third longer
 _MOST_RUNS, _MOST_ROWS = 3, 10  # of a sweep in its picture and in its table
 
@@ -65,9 +66,10 @@ def _piles(runs: Sequence[Run], time: float | None = None) -> Image:
 
     subjects = [Subject(run.path) for run in runs]
     indices = [[len(one.frames) - 1 if time is None else one.frames.nearest(time)] for one in subjects]
-    side = _SIDE if len(runs) == 1 else round(0.7 * _SIDE)
-    style = Style.of([subject.run for subject in subjects], color_by=None, size=(side, side), view=None)
-    return next(pictures(subjects, indices, style, quick=True))
+    style = Style.of([subject.run for subject in subjects], color_by=None, size=(_SIDE, _SIDE), view=None)
+    image = next(pictures(subjects, indices, style, quick=True))
+    image.thumbnail((_WIDEST, _SIDE))
+    return image
 
 
 def _particles(scene: Scene) -> Image:
@@ -101,8 +103,7 @@ def show_sweep(path: Path, runs: Sequence[Run], values: pd.DataFrame) -> str:
     states = [run.status.state for run in runs]
     shown = values.assign(state=states)
     head = f"{path}: {states.count('done')} of {len(runs)} runs are done"
-    caption = pd.Series([head]).to_frame().to_html(index=False, header=False, border=0)
-    table = caption + shown.to_html(max_rows=_MOST_ROWS, border=0)
+    table = f"<div><p>{escape(head)}</p>{shown.to_html(max_rows=_MOST_ROWS, border=0)}</div>"
     drawn = [run for run in runs if any(run.path.glob("frames.*"))]
     places = sorted({round(place) for place in np.linspace(0, len(drawn) - 1, min(_MOST_RUNS, len(drawn)))})
     return beside(table, _png(lambda: _piles([drawn[place] for place in places])) if drawn else None)

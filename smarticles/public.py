@@ -18,7 +18,7 @@ import yaml
 
 from dem.errors import InputError, RunError
 from dem.record.frame import Frame
-from dem.record.names import SCENE
+from dem.record.names import MANIFEST, SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import SCHEMA_VERSION, dump_scene
 from dem.scene.scene import Scene
@@ -45,6 +45,8 @@ OwnMeasure = FrameMeasure | Callable[[Frame, Run], float]
 
 # Options of the command line and keys of `vary`, as messages name them, and what Python calls them.
 _IN_PYTHON = (
+    (r"go on with it by --resume", "resume=True continues it, or returns it if it is done"),
+    (r"resume with \S+ and no --set, or run the changed scene", "run the changed scene"),
     (r"--resume\b", "resume=True"),
     (r"--(threads|ranks|jobs) (\d+)", r"\1=\2"),
     (r"--(out|threads|ranks|jobs)\b", r"\1"),
@@ -123,10 +125,11 @@ def run(
 
     Args:
         scene: scene, or path of a scene file.
-        out: run directory. It must be absent or empty; with `resume` it may hold an unfinished run of this scene.
+        out: run directory. It must be absent or empty; with `resume` it may hold a run of this scene.
         threads: number of threads of YADE. Results are reproducible bit by bit with one thread only.
         ranks: number of MPI processes of LAMMPS; None: 1, or with `resume` the number at the start.
-        resume: continue an unfinished run from its last checkpoint.
+        resume: if `out` holds a run of this scene, continue it from its last checkpoint, or return it at once if it is
+            done; otherwise start it. So a cell of a notebook can be run again.
 
     Raises:
         InputError: the scene is not valid, or `out` contains other files.
@@ -136,7 +139,8 @@ def run(
         file = Path(scratch, "scene.yaml") if isinstance(scene, Scene) else Path(scene)
         if isinstance(scene, Scene):
             file.write_text(dump_scene(scene), encoding="utf-8")
-        words = [*smarticles_command(file, Path(out), resume), "--threads", str(threads)]
+        held = (Path(out) / MANIFEST).is_file()
+        words = [*smarticles_command(file, Path(out), resume and held), "--threads", str(threads)]
         words += [] if ranks is None else ["--ranks", str(ranks)]
         if isinstance(scene, Scene):
             # The file in the temporary folder will not exist; `scene.yaml` in the run directory will.

@@ -91,8 +91,11 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
     from templates.slurm.submission import reject_queued  # noqa: PLC0415
 
     reject_queued(folder)
+    console = Console(file=bare(sys.stderr))
+    if console.is_jupyter:  # each line would be an output of its own, and a kernel claims to be a terminal
+        console = Console(file=sys.stdout, force_jupyter=False, force_terminal=False)
     try:
-        return run_folder(folder, Display(Console(file=bare(sys.stderr))), slots=jobs)
+        return run_folder(folder, Display(console), slots=jobs)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"finished runs are kept; continue with: {command}") from None
 

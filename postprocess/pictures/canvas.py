@@ -6,6 +6,7 @@ Pictures are drawn at twice their size and scaled down. No display is needed: VT
 import ctypes
 import math
 import os
+import pwd
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -211,6 +212,7 @@ class Canvas:
         quick: bool = False,
     ) -> None:
         check_graphics()
+        quiet_mesa()
         self._style, self._columns = style, columns
         self.size = style.size[0] * columns, style.size[1]
         self.pixel = style.pixel(extent)
@@ -402,6 +404,20 @@ def check_graphics() -> None:
     raise RunError(
         "cannot draw: no display and no libEGL.so.1; apt-get install libegl1 libgl1-mesa-dri, or see smarticles doctor"
     )
+
+
+def quiet_mesa() -> None:
+    """Leave out Mesa's cache of shaders where its folder cannot be made; Mesa would print a line at each try."""
+    given = os.environ.get("MESA_SHADER_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    try:
+        # Mesa takes the home directory of the user, not $HOME, and without either it has no cache.
+        folder = Path(given or Path(pwd.getpwuid(os.getuid()).pw_dir, ".cache"))
+        folder.mkdir(parents=True, exist_ok=True)
+        usable = os.access(folder, os.W_OK)
+    except (KeyError, OSError):
+        usable = False
+    if not usable:
+        os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
 
 
 @contextmanager

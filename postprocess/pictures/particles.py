@@ -40,9 +40,9 @@ def _draw(meshes: Sequence[pv.PolyData], names: Sequence[str], *, size: int, tit
         low, high, *_ = (MILLIMETRE * bound for bound in mesh.bounds)
         placed.append(mesh.scale(MILLIMETRE).translate((edge - low, 0.0, 0.0)))
         edge += high - low + _GAP * wide
-    scale = ColourScale(kind="name", labels={float(k): name for k, name in enumerate(names) if name})
+    scale = ColourScale(kind="name", labels={float(k): name for k, name in enumerate(names)})
     colours = np.repeat(scale.painted(np.arange(len(placed))), [mesh.n_cells for mesh in placed], axis=0)
     style = Style(field=BY_NAME["entry"], size=(size, size), axes=axes_from(*_VIEW))
-    with Canvas(style, extent(placed, style.axes), None, scale=scale) as canvas:
+    with Canvas(style, extent(placed, style.axes), None, scale=scale if any(names) else None) as canvas:
         canvas.show(0, None, {"smarticles": joined(placed)}, colours, [title])
         return canvas.image()
