@@ -22,7 +22,9 @@ def draw_smarticle(
     vertices: Vertices, thickness_normal: float, thickness_in_plane: Sequence[float], *, size: int, title: str
 ) -> Image.Image:
     """Draw one smarticle with vertices (4, 3) and thicknesses of its links [m]; `size` is in pixels."""
-    mesh = link_boxes(vertices[None], thickness_normal=thickness_normal, thickness_in_plane=thickness_in_plane)
+    mesh = link_boxes(
+        np.asarray(vertices)[None], thickness_normal=thickness_normal, thickness_in_plane=thickness_in_plane
+    )
     return _draw([mesh], [""], size=size, title=title)
 
 

@@ -69,8 +69,10 @@ def shade(axes: Axes, phases: Spans, *, named: bool = True) -> None:
         return
     begin, finish = phases[0][0], phases[-1][1]
     axes.set_xlim(begin, finish)
-    wide, high = (_POINTS * side * _AXES for side in axes.figure.get_size_inches())
-    high /= len(axes.figure.axes)
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    wide, high = (_POINTS * side * _AXES for side in figure.get_size_inches())
+    high /= len(figure.axes)
     filled: list[float] = []  # end of the text in each line [s]
     for number, (start, end, kind) in enumerate(phases):
         if number % 2:
