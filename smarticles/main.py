@@ -9,14 +9,14 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from dem.errors import InputError, RunError
 from dem.run.stop import release
-from dem.terminal import printable
+from dem.terminal import folded, printable, screen_width
 from smarticles.command_line import Commands, Parser, add_options
 from smarticles.commands import (
     accuracy,
@@ -179,9 +179,12 @@ def _explain(error: Exception) -> tuple[str, int]:
 
 
 def _complain(text: str, error: BaseException, debug: bool) -> None:
-    print(f"smarticles: {' '.join(text.split())}", file=sys.stderr)
-    if debug:
-        traceback.print_exception(error)
+    # A terminal that was closed cannot show the text.
+    with suppress(OSError):
+        line = f"smarticles: {' '.join(text.split())}"
+        print(folded(line, width=screen_width(sys.stderr), at="; "), file=sys.stderr)
+        if debug:
+            traceback.print_exception(error)
 
 
 def _stop(_number: int, _frame: FrameType | None) -> None:

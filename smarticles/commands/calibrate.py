@@ -9,9 +9,10 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING
 
+from dem.display import progress_of
 from dem.errors import InputError
 from dem.record.names import OF_SWEEP
-from dem.terminal import warn
+from dem.terminal import folded, screen_width, warn
 from smarticles import sweeps
 from smarticles.command_line import Commands, add_options, columns
 
@@ -102,14 +103,18 @@ def run_calibrate(arguments: argparse.Namespace) -> int:
 
     if arguments.table is not None:
         table = TableSimulator(problem, read_runs(arguments.table), str(arguments.table))
-        result = calibrate(problem, table, say=_say)
+        result = calibrate(problem, table, say=_say, shown=progress_of)
     else:
-        result = calibrate(problem, SweepSimulator(problem, arguments, for_cluster=for_cluster), say=_say)
+        result = calibrate(
+            problem, SweepSimulator(problem, arguments, for_cluster=for_cluster), say=_say, shown=progress_of
+        )
     if result is None:
         print(f"when these runs are done, continue with: {arguments.command_line}")
         return 0
     output = arguments.out / "results"
-    print("\n".join(write(result, output, arguments.command_line)))
+    with progress_of("writing tables and figures"):
+        lines = write(result, output, arguments.command_line)
+    print(folded("\n".join(lines), width=screen_width()))
     print(f"tables and figures: {output}")
     return 0
 
@@ -189,11 +194,13 @@ class SweepSimulator:
         from studies.calibration.simulators import measured  # noqa: PLC0415
 
         found: list[tuple[Mapping[str, Value], Measured | None]] = []
-        for entry in folder.entries:
-            condition = entry.values["condition"]
-            names = [datum.measure for datum in self.problem.data if datum.condition == condition]
-            done = folder.is_done(entry)
-            found.append((entry.values, measured(Run(folder.run(entry)), names) if done else None))
+        with progress_of("measuring") as progress:
+            for number, entry in enumerate(folder.entries, start=1):
+                condition = entry.values["condition"]
+                names = [datum.measure for datum in self.problem.data if datum.condition == condition]
+                done = folder.is_done(entry)
+                found.append((entry.values, measured(Run(folder.run(entry)), names) if done else None))
+                progress("runs measured", number, len(folder.entries))
         return found
 
 

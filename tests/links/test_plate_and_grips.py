@@ -261,7 +261,7 @@ def blocks() -> Scene:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     out = tmp_path_factory.mktemp("blocks") / "whole"
-    run_scene(blocks(), out, command="", progress=False)
+    run_scene(blocks(), out, command="")
     return Run(out)
 
 

@@ -11,7 +11,6 @@ import pytest
 from command_cases import Smarticles
 
 from dem.errors import InputError, RunError
-from dem.terminal import ERASE_LINE, printable
 from smarticles.command_line import Cell, columns
 from smarticles.main import build_parser, guarded, orderly_stop
 
@@ -110,13 +109,6 @@ def test_control_characters_reach_the_terminal_as_escapes(tmp_path: Path, smarti
         assert said.status == 2
         assert r"\x1b" in said.err
         assert not set("\x1b\x07\r").intersection(said.out + said.err)
-
-
-def test_a_line_of_progress_is_still_redrawn(capsys: pytest.CaptureFixture[str]) -> None:
-    with printable():
-        sys.stderr.write(ERASE_LINE)
-        sys.stderr.write("\x1b[1m")
-    assert capsys.readouterr().err == "\r\x1b[K" + r"\x1b[1m"
 
 
 @pytest.mark.parametrize("words", [["--debug", "plan", "absent.yaml"], ["plan", "absent.yaml", "--debug"]])
