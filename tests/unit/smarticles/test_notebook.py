@@ -7,6 +7,7 @@ import sys
 from html.parser import HTMLParser
 from io import BytesIO
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -189,17 +190,17 @@ def test_a_cell_is_run_again(tmp_path: Path) -> None:
     )
 
 
-def test_lines_of_a_sweep_are_one_stream_in_a_notebook(
+def test_a_sweep_is_one_cell_and_one_stream_in_a_notebook(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = make_folder(write_sweep(scene_of(), {"seed": [1, 2]}, tmp_path), tmp_path / "out", "test")
     monkeypatch.setattr(type(folder), "is_done", lambda *_: True)
-    shown: list[object] = []
+    shown = Mock()
     monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
-    monkeypatch.setattr("rich.jupyter.display", lambda *what: shown.append(what))
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)  # as the stream of a kernel claims
+    for module in ("IPython.display", "rich.jupyter"):
+        monkeypatch.setattr(f"{module}.display", shown)
     compute(folder, jobs=1, command="again")
     said = capsys.readouterr()
-    assert said.out == "seed1 finished before\nseed2 finished before\n"
-    assert said.err == ""
-    assert not shown
+    assert [line.lstrip("= ") for line in said.out.splitlines()] == ["seed1 finished before", "seed2 finished before"]
+    assert said.err == ""  # which looks like a failure
+    assert shown.call_count == 1  # the bars, which are updated in place
