@@ -214,6 +214,7 @@ class Canvas:
         check_graphics()
         quiet_mesa()
         self._style, self._columns = style, columns
+        self._again = 2 * quick  # VTK puts the labels of a bar right from the third drawing; shading has several
         self.size = style.size[0] * columns, style.size[1]
         self.pixel = style.pixel(extent)
         # Captions are higher than the bars below, so the centre is not that of the picture.
@@ -304,6 +305,9 @@ class Canvas:
         """Return the picture of all panels."""
         with quiet_vtk():
             self._plotter.render()
+            for _ in range(self._again):
+                self._plotter.render_window.Render()
+            self._again = 0
             image = Image.fromarray(self._plotter.screenshot(return_img=True)).reduce(_OVERSAMPLING)
         left, top, right, bottom = self._bar
         draw = ImageDraw.Draw(image)

@@ -20,6 +20,7 @@ from postprocess.bodies.colours import ColourScale, Paint, colour_field, scalars
 from postprocess.bodies.fields import BY_NAME, entries, link_values
 from postprocess.pictures.canvas import Canvas
 from postprocess.pictures.render import render_run
+from postprocess.view import RunView
 
 ROD: dict[str, Any] = {"shape": "rod", "length_m": 0.012, "diameter_m": 0.001}
 STAPLE: dict[str, Any] = {"shape": "staple", "crown_m": 0.008, "leg_m": 0.006, "diameter_m": 0.001}
@@ -112,3 +113,14 @@ def test_named_colours_are_distinct_and_numbers_keep_theirs(tmp_path: Path) -> N
     plain = ColourScale.of(BY_NAME["smarticle_id"], (0.0, 1.0), [run])
     assert not plain.labels
     assert plain.painted(values)[0, 0].tolist() == Paint("#e07070").rgb.tolist()  # hue 0
+
+
+def test_the_page_of_a_run_has_the_legend(tmp_path: Path) -> None:
+    view = RunView(run_of(tmp_path / "run", ROD | {"spread": 0.2}, STAPLE).path)
+    view.draw()
+    assert view.legend() == [{"colour": "#56b4e9", "label": "0 rod"}, {"colour": "#e69f00", "label": "1 staple"}]
+    view.colour_by("smarticle_id")
+    assert view.legend() == []
+    view.colour_by("contacts")
+    view.draw()
+    assert [row["label"] for row in view.legend()] == ["1", "0"]  # a scale has its greatest value on top
