@@ -43,7 +43,7 @@ def done(code: str, folder: Path) -> str:
 
 
 def test_it_draws_what_it_says(worked: Path) -> None:
-    for name, size in (("height.png", (345, 690)), ("amplitude.png", (390, 750))):
+    for name, size in (("height.png", (690, 1380)), ("amplitude.png", (390, 750))):
         with Image.open(worked / name) as image:
             pixels = np.asarray(image.convert("L"))
         assert pixels.shape == size
