@@ -6,7 +6,7 @@
     done = smarticles.run(scene, "runs/a")
     done.series["com_height_m"], done.frames[-1].vertices, smarticles.measure(done)
     smarticles.measures.link_crossings(done.frames[-1].vertices)
-    smarticles.plot(done)
+    smarticles.plot(done), smarticles.plot(done, "com_height_m")
     many = smarticles.sweep(scene, "ratios", vary={"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2]})
     many.table(by="aspect_ratio")
 
