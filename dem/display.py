@@ -12,7 +12,7 @@ from contextlib import AbstractContextManager, contextmanager, redirect_stderr
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self, TextIO, cast
 
-from dem.terminal import bare, escaped, spelling
+from dem.terminal import bare, escaped, folded, spelling
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -89,6 +89,7 @@ class Display:
         self._began = self._drawn = time.monotonic()
         self._ended = threading.Event()
         self._stack = contextlib.ExitStack()
+        self._spoken = False
         self._live: Any = None
         self._cell: Any = None
 
@@ -149,17 +150,19 @@ class Display:
 
     def print(self, line: str) -> None:
         """Write a line that stays, above the rows."""
+        self._spoken = True
         if self._live is not None:
-            self._live.console.print(escaped(line), soft_wrap=True)
+            self._live.console.print(folded(escaped(line), width=self._live.console.width), soft_wrap=True)
         else:
             # Notebooks colour standard error like a failure.
             print(escaped(line), file=self._stream if self._cell is None else sys.stdout, flush=True)
 
     def _write_lines(self) -> None:
-        wait = self._patience_s
+        wait, first = self._patience_s, True
         while not self._ended.wait(wait):
-            wait = self._interval_s
-            if self._rows:
+            due = not (first and self._spoken)  # whoever has seen a line waits for the next
+            wait, first = self._interval_s, False
+            if self._rows and due:
                 with contextlib.suppress(OSError, ValueError):  # a closed terminal or file
                     self.print("; ".join(row.to_text() for row in self._rows))
 
@@ -244,7 +247,7 @@ class _Counted:
         if what != self._what:
             self._what, self._began, self._first = what, now, done
         since, left = done - self._first, None
-        if since > 0:
+        if since > 0 and done < total:  # after the last part, others may follow
             left = (now - self._began) * (total - done) / since
         fraction = done / total if total else None
         self._display.update(Row(label=what, fraction=fraction, detail=f"{done} of {total}", left_s=left))

@@ -1,6 +1,7 @@
 """Parse command lines with one-line errors; define common options; format tables and JSON."""
 
 import argparse
+import difflib
 import json
 import math
 import re
@@ -30,7 +31,7 @@ class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         paragraphs = text.split("\n\n")
         return "\n\n".join(
-            folded(paragraph, width=width)
+            folded(paragraph, width=shutil.get_terminal_size().columns)
             if re.search(r"^ ", paragraph, re.MULTILINE)
             else fill(paragraph, width, break_on_hyphens=False)
             for paragraph in paragraphs
@@ -59,8 +60,11 @@ class Parser(argparse.ArgumentParser):
         word = words[0].partition("=")[0]
         if not word.startswith("-"):
             self.error(f"one argument too many: {words[0]!r}")
-        options = [name for action in self._actions for name in action.option_strings]
-        self.error(f"unknown option {word}; {nearest(word, options, cutoff=0.5)}")
+        # Compared without dashes, which all options have in common.
+        options = {name.lstrip("-"): name for action in self._actions for name in action.option_strings}
+        near = difflib.get_close_matches(word.lstrip("-"), options, n=1)
+        advice = f"did you mean {options[near[0]]!r}?" if near else f"known: {', '.join(options.values())}"
+        self.error(f"unknown option {word}; {advice}")
 
 
 class Commands:

@@ -57,11 +57,10 @@ measure, draw and compare run directories."""
 _EPILOG = """\
 first steps:
   smarticles doctor                        test the installation
-  smarticles study gravish --quick --out demo
-                                           pour, shake, measure, compare with Gravish (minutes)
   smarticles init                          write a small commented scene.yaml
   smarticles plan scene.yaml               print phases, effects, expected wall time
   smarticles run scene.yaml --out run1     compute
+  smarticles render run1                   draw the last frame
 
 completion of commands and options: add eval "$(smarticles --completion bash)" to ~/.bashrc; for zsh,
 write the output of --completion zsh to a file _smarticles in a folder of $fpath
@@ -140,7 +139,8 @@ def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
     except KeyboardInterrupt as error:
-        _complain(f"stopped; {str(error) or 'all written files are complete'}", error, debug)
+        what = str(error) or "all written files are complete; repeat the command to go on"
+        _complain(f"stopped; {what}", error, debug)
         return STOPPED
     except Exception as error:  # reported as an internal error
         text, status = _explain(error)

@@ -77,11 +77,11 @@ def _particles(scene: Scene) -> Image:
     from dem.run.run import kinds_of  # noqa: PLC0415  (slow to import)
     from postprocess.pictures.particles import draw_bars, draw_smarticle  # noqa: PLC0415  (of the extra "viz")
 
-    if scene.shapes is None or scene.mixture is None:
-        boxes = scene.particle.boxes
+    if scene.particle is None or scene.mixture is None:
+        boxes = scene.body.boxes
         thicknesses = boxes.thickness_normal, boxes.thicknesses_in_plane
         return draw_smarticle(boxes.vertices, *thicknesses, size=_SIDE, title=scene.name)
-    sizes = [len(shape.factors) for shape in scene.shapes]
+    sizes = [len(shape.factors) for shape in scene.particle]
     middles = [sum(sizes[:number]) + size // 2 for number, size in enumerate(sizes)]
     kinds = [kinds_of(scene.mixture)[place] for place in middles]
     bars = [scene.mixture.kinds[place].bars for place in middles]

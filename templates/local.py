@@ -158,6 +158,7 @@ class _Runner:
     lock: int
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     active: dict[str, tuple[subprocess.Popen[bytes], float]] = field(default_factory=dict)
+    latest: dict[str, Progress] = field(default_factory=dict)
     stopping: bool = False
     guard: threading.Lock = field(default_factory=threading.Lock)
 
@@ -251,10 +252,7 @@ class _Runner:
 
     def _snapshot(self) -> Snapshot:
         now = time.monotonic()
-        running = tuple(
-            (name, now - began, Run(self.folder.path / "runs" / name).progress)
-            for name, (_, began) in list(self.active.items())
-        )
+        running = tuple((name, now - began, self._progress(name)) for name, (_, began) in list(self.active.items()))
         expected = {entry.name: entry.expected_s for entry in self.folder.entries}
         return Snapshot(
             total=len(self.folder.entries),
@@ -263,6 +261,13 @@ class _Runner:
             running=running,
             left_s=time_left(expected, self.outcomes, running, slots=self.slots),
         )
+
+    def _progress(self, name: str) -> Progress:
+        """Return the latest known progress of a run, which has no file of it any more when it is about to end."""
+        progress = Run(self.folder.path / "runs" / name).progress
+        if progress.time_s is not None:
+            self.latest[name] = progress
+        return self.latest.get(name, progress)
 
 
 def time_left(

@@ -84,7 +84,7 @@ def swing(seconds: float) -> dict[str, Any]:
 
 def law_of(scene: Scene) -> ContactLaw:
     """Return the contact law of a scene."""
-    return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)
+    return contact_law(scene.body, scene.contact, scene.fidelity.stiffness_N_per_m)
 
 
 def ball_law(
@@ -188,4 +188,4 @@ def fastest(engine: Engine) -> float:
 
 def lying(scene: Scene) -> float:
     """Return the height of the centre of mass of a smarticle lying flat on the floor [m]."""
-    return float(scene.particle.radius - scene.particle.centres[:, 2].min())
+    return float(scene.body.radius - scene.body.centres[:, 2].min())

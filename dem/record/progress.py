@@ -67,16 +67,19 @@ class Estimate:
 
 
 def row_of(progress: Progress, *, label: str = "") -> Row:
-    """Return the row of a display that shows the progress of a run; without a label it begins with the phase."""
+    """Return the row of a display that shows the progress of a run.
+
+    Without a label it begins with the phase; with one, as in a sweep, it is shorter.
+    """
     phase = progress.phase or "starting"
     if progress.phases is not None and progress.index is not None:
         phase += f" ({progress.index + 1} of {progress.phases})"
     parts = [phase] if label else []
     if progress.time_s is not None:
         parts.append(f"t = {progress.time_s:.2f} s")
-    if progress.phase == "deposit" and progress.total is not None:
+    if not label and progress.phase == "deposit" and progress.total is not None:
         parts.append(f"{progress.count} of {progress.total} poured")
-    elif progress.phi is not None:
+    elif not label and progress.phi is not None:
         parts.append(f"φ {progress.phi:.3f}")
     return Row(label=label or phase, fraction=progress.fraction, detail="  ".join(parts), left_s=progress.left_s)
 

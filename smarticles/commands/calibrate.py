@@ -82,32 +82,28 @@ def add(commands: Commands) -> None:
 
 def run_calibrate(arguments: argparse.Namespace) -> int:
     """Compute the missing runs of a calibration, and analyse it when all are done; return the exit status."""
-    import numpy as np  # noqa: PLC0415
-
     from studies.calibration.inference import calibrate, require_extra  # noqa: PLC0415
+    from studies.calibration.measures import check_measures  # noqa: PLC0415
     from studies.calibration.problem import load_problem  # noqa: PLC0415
     from studies.calibration.simulators import TableSimulator, read_runs  # noqa: PLC0415
 
     problem = load_problem(arguments.calibration)
-    if arguments.table is None:
-        # Scenes at both ends of all priors are checked before runs are spent on the values between them.
-        problem.sweep(1, np.stack(problem.bounds))
     for_cluster = sweeps.is_for_cluster(arguments)
+    table = None
+    if arguments.table is None:
+        check_measures(problem)
+    else:
+        table = TableSimulator(problem, read_runs(arguments.table, problem), str(arguments.table))
     if arguments.dry_run:
-        print(_listing(problem))
+        print(_listing(problem) if table is None else table.listing())
         return 0
     if arguments.out is None:
         raise InputError("calibrate: --out DIR is missing; give a directory, or --dry-run to only list the runs")
     require_extra()
     from studies.calibration.report import write  # noqa: PLC0415  (draws: an extra)
 
-    if arguments.table is not None:
-        table = TableSimulator(problem, read_runs(arguments.table), str(arguments.table))
-        result = calibrate(problem, table, say=_say, shown=progress_of)
-    else:
-        result = calibrate(
-            problem, SweepSimulator(problem, arguments, for_cluster=for_cluster), say=_say, shown=progress_of
-        )
+    simulator = table or SweepSimulator(problem, arguments, for_cluster=for_cluster)
+    result = calibrate(problem, simulator, say=_say, shown=progress_of)
     if result is None:
         print(f"when these runs are done, continue with: {arguments.command_line}")
         return 0

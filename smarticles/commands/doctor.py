@@ -163,9 +163,9 @@ def examine(arguments: argparse.Namespace) -> int:
         found.append(check)
         if not arguments.json:
             state = "ok" if check.ok else "FAILS" if check.needed else "no"
-            print(folded(f"{check.name:<15} {state:<5}  {check.found}", width=screen_width()), flush=True)
+            print(folded(f"{check.name:<15} {state:<5} {check.found}", width=screen_width()), flush=True)
             if check.way_out:
-                text = f"{'':<15} {'':<5}  way out: {check.way_out}"
+                text = f"{'':<15} {'':<5} way out: {check.way_out}"
                 print(folded(text, width=screen_width()), flush=True)
     failed = [check.name for check in found if check.needed and not check.ok]
     if arguments.json:

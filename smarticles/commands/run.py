@@ -124,12 +124,7 @@ def read_scene(scene_file: Path, settings: Sequence[str]) -> Scene:
     from dem.plan.steps import time_steps  # noqa: PLC0415
     from dem.scene.reading import load_scene  # noqa: PLC0415
 
-    scene = load_scene(scene_file, settings)
-    try:
-        time_steps(scene)
-    except InputError as error:
-        raise InputError(f"{scene_file}: {error}") from None
-    return scene
+    return load_scene(scene_file, settings, check=time_steps)
 
 
 def _run(

@@ -39,7 +39,7 @@ DIR gets the runs, and DIR/results the tables, the figures and a picture of one 
 study; repeat the command to continue. `smarticles status DIR` prints the progress. --analyse analyses
 the finished runs, also while others are being computed.""",
         examples="""\
-  smarticles study gravish --quick --out demo
+  smarticles study gravish --quick --out gravish-quick
   smarticles study gravish --out gravish
   smarticles study gravish --out gravish --jobs 4            use 4 cores
   smarticles study gravish --out gravish-yade --engine yade    compute every run on YADE

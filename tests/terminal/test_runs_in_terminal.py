@@ -1,6 +1,7 @@
 """A running simulation on a terminal: its bar, its stop, and what is left on the screen."""
 
 import re
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -152,3 +153,26 @@ def test_ctrl_c_stops_a_sweep_and_says_how_to_go_on(type_command: Type) -> None:
         lines = terminal.lines
     assert "continue with: smarticles sweep" in " ".join(line.strip() for line in lines[-3:])
     assert sum("━" in line for line in lines) == 0
+
+
+_SCRIPT = """\
+import smarticles
+scene = smarticles.Scene(
+    seed=1, count=12, engine="links", fidelity="draft",
+    phases=[{"type": "deposit", "per_layer": 6}, {"type": "shake", "duration_s": 40}],
+)
+smarticles.run(scene, "runs/script")
+"""
+
+
+def test_python_shows_a_bar_and_stops_at_ctrl_c(here: Path) -> None:
+    with Terminal([sys.executable, "-c", _SCRIPT], folder=here) as terminal:
+        terminal.wait_for(shaking)
+        terminal.press_ctrl_c()
+        terminal.end()
+        lines = terminal.lines
+    assert bar(lines) == ""
+    assert "KeyboardInterrupt: runs/script: stopped; go on with" in "".join(lines)
+    assert "resume=True" in "".join(lines)[-20:]
+    assert Run(here / "runs/script").status.state == "interrupted"
+    assert Run(here / "runs/script").can_resume
