@@ -154,7 +154,8 @@ class Display:
         if self._live is not None:
             self._live.console.print(folded(escaped(line), width=self._live.console.width), soft_wrap=True)
         else:
-            print(escaped(line), file=self._stream, flush=True)
+            # Notebooks colour standard error like a failure.
+            print(escaped(line), file=self._stream if self._cell is None else sys.stdout, flush=True)
 
     def _write_lines(self) -> None:
         wait, first = self._patience_s, True

@@ -204,7 +204,7 @@ class _Painter:
         if not any(np.isfinite(each).any() for each in values):
             raise InputError(f"--color-by {self._field.name}: no frame to export has it; choose another field")
         self._bounds = span(values)
-        self._scale = ColourScale.of(self._field, self._bounds)
+        self._scale = ColourScale.of(self._field, self._bounds, [bodies.run])
 
     def content(self, frame: Frame, suffix: str) -> bytes | None:
         """Return the content of the file of a frame, with one object per kind; None if there is no body.

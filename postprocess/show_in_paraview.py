@@ -1,4 +1,4 @@
-"""Show an exported run in ParaView: bodies coloured by crossings, kinds or contacts, and the wall cut open.
+"""Show an exported run in ParaView: bodies coloured by crossings, entries or contacts, and the wall cut open.
 
     paraview --script=show_in_paraview.py                     in ParaView's window; then press play
     pvpython show_in_paraview.py FOLDER --picture last.png    a picture of the last frame, without a window
@@ -27,13 +27,14 @@ COLOURS = {
     "wall": "#9db4c8",
     "floor": "#e9e9e7",
     "hooks": "#b3261e",
+    "plate": "#6d7f91",
     "strings": "#5b4636",
     "crossings": "#1a1a1a",
     "forces": "#a11a2e",
 }
 SIZE = [1000, 800]  # of pictures [pixel]
 NUMBER = "smarticle_id"  #: Field that colours planar runs
-KINDS = ("smarticles", "wall", "floor", "hooks", "strings", "crossings", "forces")
+KINDS = ("smarticles", "wall", "floor", "hooks", "plate", "strings", "crossings", "forces")
 
 
 def rgb(colour: str) -> list[float]:
@@ -148,10 +149,10 @@ def colouring(source: Any) -> str:
     fields = source.CellData
     if fields.GetArray("crossings") is None:  # the run is planar
         return NUMBER
-    kind = fields.GetArray("kind")
-    if kind is None:
+    entry = fields.GetArray("entry")
+    if entry is None:
         return "crossings"
-    return "kind" if kind.GetRange()[1] > 0 else "contacts"
+    return "entry" if entry.GetRange()[1] > 0 else "contacts"
 
 
 def wall(kind: str, source: Any, view: Any) -> None:
@@ -167,6 +168,11 @@ def wall(kind: str, source: Any, view: Any) -> None:
     half.ClipType.Normal = [0.0, -1.0, 0.0]
     simple.Hide(source, view)
     plain(kind, half, view).Opacity = 0.3
+
+
+def plate(kind: str, source: Any, view: Any) -> None:
+    """Show the plate, through which bodies are visible."""
+    plain(kind, source, view).Opacity = 0.35
 
 
 def strings(kind: str, source: Any, view: Any) -> None:
@@ -206,6 +212,7 @@ def forces(kind: str, source: Any, view: Any) -> None:
 SHOWERS: dict[str, Callable[[str, Any, Any], Any]] = {
     "smarticles": boxes,
     "wall": wall,
+    "plate": plate,
     "strings": strings,
     "crossings": arrows,
     "forces": forces,

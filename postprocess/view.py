@@ -126,7 +126,7 @@ class RunView:
     def draw(self) -> None:
         """Draw the bodies of the shown frame."""
         values = scalars(self.field, self.frame, self.run)
-        colours = ColourScale.of(self.field, self._widened(values)).painted(values)
+        colours = ColourScale.of(self.field, self._widened(values), [self.run]).painted(values)
         if self.pick is not None:
             colours[self.frame.smarticle_ids == self.pick.smarticle_id] = PICKED
         self._meshes = visible_meshes(self._bodies, self.frame, np.zeros(3))
@@ -140,10 +140,10 @@ class RunView:
         self.plotter.reset_camera(render=False)
 
     def legend(self) -> list[dict[str, str]]:
-        """Return colours and labels of the legend, from the greatest value; empty for a field of kind "name"."""
-        scale = ColourScale.of(self.field, self._bounds.get(self.field.name, (0.0, 1.0)))
+        """Return colours and labels of the legend: names in order, other values from the greatest one."""
+        scale = ColourScale.of(self.field, self._bounds.get(self.field.name, (0.0, 1.0)), [self.run])
         colours = scale.painted(np.array(list(scale.labels))).tolist()
-        pairs = reversed(list(zip(colours, scale.labels.values(), strict=True)))
+        pairs = list(zip(colours, scale.labels.values(), strict=True))[:: 1 if scale.kind == "name" else -1]
         return [{"colour": "#{:02x}{:02x}{:02x}".format(*colour), "label": label} for colour, label in pairs]
 
     def pick_along(self, ray: Floats) -> None:

@@ -6,7 +6,7 @@
     done = smarticles.run(scene, "runs/a")
     done.series["com_height_m"], done.frames[-1].vertices, smarticles.measure(done)
     smarticles.measures.link_crossings(done.frames[-1].vertices)
-    smarticles.plot(done)
+    smarticles.plot(done), smarticles.plot(done, "com_height_m")
     many = smarticles.sweep(scene, "ratios", vary={"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2]})
     many.table(by="aspect_ratio")
 
@@ -63,6 +63,7 @@ if not TYPE_CHECKING:  # hidden from type checkers, which would accept any name
 
             value = version("smarticles")
         elif name in __all__:
+            import_module("smarticles.notebook")  # which registers how notebooks show what the names give
             value = getattr(import_module(_MODULES.get(name, "smarticles.public")), name)
         else:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}; known: {', '.join(sorted(__all__))}")

@@ -1,6 +1,7 @@
 """Define the console command `smarticles`; its help lists the exit statuses."""
 
 import argparse
+import logging
 import os
 import shlex
 import signal
@@ -115,6 +116,8 @@ class _PrintCompletion(argparse.Action):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run `smarticles` with the given arguments, by default those of this process; return the exit status."""
     words = list(sys.argv[1:] if argv is None else argv)
+    # It logs advice about its folders where there is no home directory.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     with printable():
         return guarded(lambda: _dispatch(words), debug="--debug" in words)
 

@@ -23,7 +23,7 @@ import yaml
 from dem.display import Display
 from dem.errors import InputError, RunError, shown
 from dem.record.frame import Frame
-from dem.record.names import SCENE
+from dem.record.names import MANIFEST, SCENE
 from dem.record.progress import row_of
 from dem.record.run import Run, open_run
 from dem.scene.reading import dump_scene
@@ -33,6 +33,7 @@ from dem.yaml_text import load_yaml, read_text
 from postprocess.measures.registry import FrameMeasure, measure_of
 from smarticles.main import BAD_INPUT
 from smarticles.measuring import grouped, measured, values_in
+from smarticles.notebook import show_sweep
 from smarticles.sweeps import compute, make_folder, raise_failures
 from templates.local import environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
@@ -42,6 +43,8 @@ from templates.sweep.sweep_file import SEED
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+    from postprocess.report.series import Chart
+
 #: A measure, or a function of a frame and its run, whose name ends with the unit of its value: `top_m`
 OwnMeasure = FrameMeasure | Callable[[Frame, Run], float]
 
@@ -50,6 +53,8 @@ Varied = Mapping[str, Sequence[Any] | Mapping[str, Any]]
 
 # Options of the command line and keys of `vary`, as messages name them, and what Python calls them.
 _IN_PYTHON = (
+    (r"go on with it by --resume", "resume=True continues it, or returns it if it is done"),
+    (r"resume with \S+ and no --set, or run the changed scene", "run the changed scene"),
     (r"--resume\b", "resume=True"),
     (r"--(threads|ranks|jobs) (\d+)", r"\1=\2"),
     (r"--(out|threads|ranks|jobs)\b", r"\1"),
@@ -87,6 +92,9 @@ class SweepDirectory(Sequence[Run]):
 
     def __len__(self) -> int:
         return len(self.folder.entries)
+
+    def _repr_html_(self) -> str:
+        return show_sweep(self.path, self[:], self.values)
 
     @overload
     def __getitem__(self, index: int) -> Run: ...
@@ -142,10 +150,11 @@ def run(
 
     Args:
         scene: scene, its keys as a mapping, or path of a scene file.
-        out: run directory. It must be absent or empty; with `resume` it may hold an unfinished run of this scene.
+        out: run directory. It must be absent or empty; with `resume` it may hold a run of this scene.
         threads: number of threads of YADE. Results are reproducible bit by bit with one thread only.
         ranks: number of MPI processes of LAMMPS; None: 1, or with `resume` the number at the start.
-        resume: continue an unfinished run from its last checkpoint.
+        resume: if `out` holds a run of this scene, continue it from its last checkpoint, or return it at once if it is
+            done; otherwise start it. So a cell of a notebook can be run again.
         progress: show a bar on the terminal or in the notebook; elsewhere a line every 30 s.
 
     Raises:
@@ -158,7 +167,8 @@ def run(
         file = Path(scratch, "scene.yaml") if isinstance(scene, Scene) else Path(scene)
         if isinstance(scene, Scene):
             file.write_text(dump_scene(scene), encoding="utf-8")
-        words = [*smarticles_command(file, Path(out), resume), "--threads", str(threads)]
+        held = (Path(out) / MANIFEST).is_file()
+        words = [*smarticles_command(file, Path(out), resume and held), "--threads", str(threads)]
         words += [] if ranks is None else ["--ranks", str(ranks)]
         if isinstance(scene, Scene):
             # The file in the temporary folder will not exist; `scene.yaml` in the run directory will.
@@ -266,17 +276,43 @@ def _few(values: Sequence[Any], most: int = 6) -> str:
     return f"{', '.join(map(str, values[:most]))}{more}"
 
 
-def plot(run: Run | Path | str, *, time: float | None = None, color_by: str | None = None) -> Image:
-    """Draw the pile of a run, as `smarticles render` does; a notebook shows the picture.
+@overload
+def plot(
+    run: Run | Path | str, series: None = None, *, time: float | None = None, color_by: str | None = None
+) -> Image: ...
+@overload
+def plot(run: Run | Path | str, series: str | Sequence[str]) -> Chart: ...
+def plot(
+    run: Run | Path | str,
+    series: str | Sequence[str] | None = None,
+    *,
+    time: float | None = None,
+    color_by: str | None = None,
+) -> Image | Chart:
+    """Draw the pile of a run, or recorded series against time, as `smarticles render` does; a notebook shows it.
 
     Args:
         run: run, or its directory.
+        series: name of a series, such as "com_height_m", or several names; None: the pile.
         time: simulated time [s] of the frame, the nearest one; None: the last frame.
         color_by: field that colours the smarticles; None: the default of `smarticles render`.
 
+    Returns:
+        The picture of the pile; for series a figure of Matplotlib with phases as bands, whose
+        `savefig("height.pdf")` writes PDF, SVG or PNG.
+
     Raises:
-        InputError: the directory is not a run directory, the run has no frames yet, or the field does not exist.
+        InputError: the directory is not a run directory, the run has no frames or no series yet, or the field or series
+            does not exist.
     """
+    if series is not None:
+        for name, value in (("time", time), ("color_by", color_by)):
+            if value is not None:
+                raise InputError(f"{name}: is for pictures of the pile, and series are drawn; leave one of them out")
+        from postprocess.report.series import draw_series  # noqa: PLC0415  (of the extra "viz")
+
+        opened = open_run(run.path if isinstance(run, Run) else run)
+        return draw_series(opened, [series] if isinstance(series, str) else list(series))
     from PIL import Image as images  # noqa: N813, PLC0415  (of the extra "viz")
 
     from postprocess.pictures.render import render_run  # noqa: PLC0415

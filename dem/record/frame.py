@@ -18,6 +18,7 @@ from dem.arrays import Array, Flags, Numbers
 from dem.body.kinds import Kind, Mixture
 from dem.body.particle import LINKS, Particle
 from dem.body.state import BarState, PileState
+from dem.notebook import Facts, Shown
 from dem.record.files import cannot_read
 from dem.record.names import FRAME, SCENE, VTKHDF, collection
 from dem.record.vtkhdf import REMEDY, read_step
@@ -163,7 +164,7 @@ class RecordedBars:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Frame:
+class Frame(Shown):
     """The bodies at one recorded time; all arrays are read-only.
 
     Piles of smarticles have `vertices`, and values of links in the form (N, 3, …). Piles of other bodies have bars in
@@ -189,6 +190,15 @@ class Frame:
     #: smarticles, and `halted`
     cell_data: Mapping[str, NDArray[Any]] = field(repr=False)
     bars: RecordedBars | None = field(repr=False, default=None)  #: Bars of other bodies; None for smarticles
+
+    def _facts(self) -> Facts:
+        yield "frame", f"{self.number}, at {self.time:.4g} s, in phase {self.phase}"
+        yield "bodies", f"{self.count}, with {len(self.body)} {'links' if self.bars is None else 'bars'}"
+        if self.count:
+            yield "highest point", f"{1e3 * (self.segments[..., 2].max() - self.floor_z):.3g} mm above the floor"
+            yield "contacts", f"{self.contacts.mean():.3g} other bodies touch a body, on average"
+        yield "further values", ", ".join(self.cell_data) or "none"
+        yield "file", str(self.path)
 
     @property
     def directory(self) -> Path:

@@ -10,11 +10,24 @@ from typing import Any, Literal, NoReturn
 import yaml
 
 from dem.errors import InputError, shown
+from dem.notebook import Facts, Shown, bodies_text
 from dem.record.document import REMEDY, Done, Failed, Manifest, Phase, Progress
 from dem.record.files import cannot_read
 from dem.record.forces import RecordedForces, has_forces, read_forces
 from dem.record.frames import FrameSequence, read_frames
-from dem.record.names import CHECKPOINT, DONE, FAILED, MANIFEST, OF_SWEEP, PROGRESS, SCENE, SERIES
+from dem.record.names import (
+    CHECKPOINT,
+    DONE,
+    FAILED,
+    FRAME,
+    MANIFEST,
+    OF_SWEEP,
+    PROGRESS,
+    SCENE,
+    SERIES,
+    VTKHDF,
+    collection,
+)
 from dem.record.rundir import in_use
 from dem.record.series import Series, read_series
 from dem.yaml_text import load_yaml, read_text
@@ -40,7 +53,7 @@ class Status:
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(Shown):
     """A run directory, of a finished or unfinished run; each part is read once, at the first access.
 
     Access to a part raises InputError if its file is missing, damaged or of another format.
@@ -53,6 +66,30 @@ class Run:
 
     def __str__(self) -> str:
         return str(self.path)
+
+    def _facts(self) -> Facts:
+        made, status = self.manifest, self.status
+        yield "run", made.name
+        yield "directory", str(self.path)
+        state: str = status.state
+        if status.time_s is not None:
+            state += f", {status.time_s:.4g} s simulated"
+        if status.wall_s is not None:
+            state += f" in {status.wall_s:.3g} s"
+        yield "state", state if status.cause is None else f"{state}: {status.cause}"
+        numbers: dict[str, int] = {}
+        for kind in made.kinds or ():
+            numbers[kind.shape] = numbers.get(kind.shape, 0) + kind.bodies
+        yield "bodies", bodies_text(made.count, numbers, made.aspect_ratio)
+        yield "engine", f"{made.engine}, {made.fidelity}, seed {made.seed}"
+        yield "phases", ", ".join(_timed(phase) for phase in self.phases)
+        frames = "none yet"
+        if any((self.path / name).exists() for name in (collection(FRAME), VTKHDF)):
+            times = self.frames.times
+            frames = f"{len(times)}, {times[0]:.4g} s to {times[-1]:.4g} s"
+        yield "frames", frames
+        if self.has_series:
+            yield "series", ", ".join(self.series)
 
     @cached_property
     def manifest(self) -> Manifest:
@@ -153,6 +190,11 @@ class Run:
             f"{self.path / SERIES}: is gone, although the run is done, so that all that was recorded in it is missing "
             f"from tables; put it back, or run {self.path / SCENE} anew elsewhere"
         )
+
+
+def _timed(phase: Phase) -> str:
+    """Return the type of a phase, and when it ended."""
+    return phase.type if phase.end_s is None else f"{phase.type} until {phase.end_s:.4g} s"
 
 
 class SceneData(dict[str, Any]):

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 PERIOD = 1.0  # s of wall time between two rewrites of the file by `keep_up`
 # Suffixes of a vector's components in column names, by the number of components.
-_COMPONENTS = {2: (" barb 1", " barb 2"), 3: (" x", " y", " z")}
+COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
 _REMEDY = "give the directory of a run that has recorded its series, or run it again"
 
 
@@ -137,8 +137,8 @@ class Series(Mapping[str, NDArray[Any]]):
         columns = {name: self[name] for name in ("time_s", "phase")}
         for name, values in self.data.items():
             parts = values[:, None] if values.ndim == 1 else values
-            marks = _COMPONENTS.get(parts.shape[1], ("",)) if values.ndim > 1 else ("",)
-            columns |= {f"{name}{mark}": part for mark, part in zip(marks, parts.T, strict=True)}
+            marks = COMPONENTS.get(parts.shape[1], ("",)) if values.ndim > 1 else ("",)
+            columns |= {f"{name} {mark}".strip(): part for mark, part in zip(marks, parts.T, strict=True)}
         return pd.DataFrame(columns)
 
     def nearest(self, time: float) -> int:

@@ -268,12 +268,13 @@ def manifest(
         ),
         planar=scene.plane is not None,
         channel_width_m=None if scene.plane is None else scene.plane.width_m,
-        kinds=None if scene.mixture is None else _kinds(scene.mixture),
+        kinds=None if scene.mixture is None else kinds_of(scene.mixture),
         taken_over=origin,
     )
 
 
-def _kinds(mixture: Mixture) -> tuple[Kind, ...]:
+def kinds_of(mixture: Mixture) -> tuple[Kind, ...]:
+    """Return the kinds of a mixture as manifests have them."""
     numbers = np.bincount(mixture.of, minlength=len(mixture.kinds))
     return tuple(
         Kind(

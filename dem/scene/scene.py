@@ -23,6 +23,7 @@ from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_widt
 from dem.engine.demand import Activity
 from dem.engine.effect import EffectName
 from dem.errors import InputError, nearest, shown
+from dem.notebook import Facts, Shown, bodies_text
 from dem.phases.deposit import Deposit
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
@@ -68,7 +69,7 @@ def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping
     return {**fidelities(engine)[base], **({"rows": 1} if engine == "links" and single else {})}
 
 
-class Scene(Part):
+class Scene(Part, Shown):
     """Description of one run: everything that its result depends on."""
 
     schema_version: Literal[1, 2] = Field(
@@ -121,6 +122,19 @@ class Scene(Part):
 
     # Tells pydantic that files are validated without this method, which would lose the folder of relative paths.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    def _facts(self) -> Facts:
+        yield "scene", self.name
+        numbers: dict[str, int] = {}
+        if self.particle is not None:
+            for shape, number in zip(self.particle, numbers_of_shapes(self.particle, self.count), strict=True):
+                numbers[shape.tag()] = numbers.get(shape.tag(), 0) + number
+        yield "bodies", bodies_text(self.count, numbers, self.smarticle.aspect_ratio)
+        if self.plane is None:
+            yield "container", f"radius {1e3 * self.container.radius_m:g} mm"
+        yield "engine", f"{self.engine}, {self.fidelity.base}, seed {self.seed}"
+        timed = [(phase.kind, getattr(phase, "duration_s", None)) for phase in self.phases]
+        yield "phases", ", ".join(kind if duration is None else f"{kind} {duration:g} s" for kind, duration in timed)
 
     def __eq__(self, other: object) -> bool:
         """Return whether all keys are equal; pydantic would compare cached properties, too, with their arrays."""

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Literal, Self
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.bodies.fields import Field, checked_field, link_values
+from postprocess.bodies.fields import Field, checked_field, entries, link_values
 from postprocess.geometry.links import Floats
 from postprocess.report import figures
 
@@ -22,6 +22,9 @@ ALIASES: Mapping[str, str] = MappingProxyType({"speed": "speed_m_per_s", "height
 """Fields by their short names."""
 
 _MOST_COUNTS = 12  # larger counts have the colour of this one
+
+# Of Okabe and Ito, distinct with common colour blindness, bright enough for shading.
+_NAMED = ("#56b4e9", "#e69f00", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7")
 
 UNKNOWN = (201, 201, 201)  #: Colour of a missing value
 
@@ -47,6 +50,7 @@ PAINTS: Mapping[str, Paint] = MappingProxyType(
         "wall": Paint("#9db4c8", 0.22),
         "floor": Paint("#e9e9e7"),
         "hooks": Paint("#b3261e"),
+        "plate": Paint("#6d7f91", 0.35),
         "strings": Paint("#5b4636"),
         "crossings": Paint("#1a1a1a"),
         "forces": Paint("#a11a2e"),
@@ -56,20 +60,28 @@ PAINTS: Mapping[str, Paint] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ColourScale:
-    """Mapping from the values of a field to colours, with its colour bar."""
+    """Mapping from the values of a field to colours, with its colour bar or its legend."""
 
     kind: Literal["count", "value", "name"]  #: Kind of the field's values, see `Field.kind`
     colours: Colormap | None = None  #: Colour map of the bar; None for a field of kind "name", without bar
     low: float = 0.0  #: Value at the lower end of the bar
     high: float = 1.0  #: Value at the upper end of the bar
-    labels: Mapping[float, str] = dataclasses.field(default_factory=dict)  #: Labels of the bar, by value
+    #: Labels of the bar, or of the legend of a field of kind "name", by value
+    labels: Mapping[float, str] = dataclasses.field(default_factory=dict)
 
     @classmethod
-    def of(cls, field: Field, bounds: Span) -> Self:
-        """Return the colour scale of a field whose values lie between two bounds."""
+    def of(cls, field: Field, bounds: Span, runs: Sequence[Run] = ()) -> Self:
+        """Return the colour scale of a field whose values lie between two bounds.
+
+        The legend of a field of kind "name" has the names of its values in all given runs.
+        """
         low, high = bounds
         if field.kind == "name":
-            return cls(kind="name")
+            named: dict[int, list[str]] = {}
+            for value, name in (each for run in runs for each in field.names(run).items()):
+                if name not in named.setdefault(value, []):
+                    named[value].append(name)
+            return cls(kind="name", labels={float(value): " or ".join(named[value]) for value in sorted(named)})
         if field.kind == "count":
             top = max(1, min(int(high), _MOST_COUNTS))
             labels = {float(count): str(count) for count in range(top + 1)}
@@ -93,6 +105,8 @@ class ColourScale:
             hue = (values[known] * (math.sqrt(5) - 1) / 2) % 1
             tone = np.stack([hue, np.full_like(hue, 0.50), np.full_like(hue, 0.88)], axis=-1)
             found[known] = (255 * hsv_to_rgb(tone)).astype(np.uint8)
+            for number, colour in enumerate(_NAMED if self.labels else ()):
+                found[values == number] = Paint(colour).rgb
         else:
             places = Normalize(self.low, self.high, clip=True)(values[known])
             found[known] = self.colours(np.asarray(places), bytes=True)[..., :3]
@@ -103,12 +117,12 @@ def colour_field(name: str | None, run: Run) -> Field:
     """Return the field of a run by its name, or by its short name in `ALIASES`.
 
     If the name is None, the field of smarticles is "crossings", or "smarticle_id" in a planar run. The field of other
-    bodies is then "contacts", or "kind" if the run has several kinds of bodies. InputError if the name is unknown, or
-    the run lacks the field.
+    bodies is then "contacts", or "entry" if the scene lists several bodies. InputError if the name is unknown, or the
+    run lacks the field.
     """
     usual = "smarticle_id" if run.manifest.planar else "crossings"
     if run.manifest.kinds is not None:
-        usual = "contacts" if len(run.manifest.kinds) == 1 else "kind"
+        usual = "contacts" if len(set(entries(run))) == 1 else "entry"
     field = checked_field(usual if name is None else name, ALIASES)
     if not field.available_for(run):
         msg = f"{run.path}: this run has no {field.name} ({field.meaning}); choose another field to colour by"

@@ -24,6 +24,7 @@ from postprocess.measures.force_chains import force_chains
 from postprocess.measures.registry import any_in_space, in_one_cylinder, in_space
 
 LINKS = 3
+LINK_NAMES = ("barb 1", "middle link", "barb 2")  #: Names of a smarticle's links
 
 IDENTITY = ("smarticle_id", "link")  #: Fields that every export contains
 
@@ -52,12 +53,35 @@ class Field:
     on_request: bool = False  #: Whether only exports and pictures that name the field have it
     label: str = ""  #: Text of the colour bar; the name if empty
     shown: tuple[float, str] | None = None  #: Factor from SI and unit of the numbers at the colour bar; None: SI
+    #: Returns the names of a run's values for a legend, by value; empty for a field without legend
+    names: Callable[[Run], Mapping[int, str]] = lambda _: {}
 
     @property
     def title(self) -> str:
         """Text of the colour bar with the unit."""
         unit, text = self.shown[1] if self.shown else self.unit, self.label or self.name
         return text if unit == "-" else f"{text} [{unit}]"
+
+
+def entries(run: Run) -> list[int]:
+    """Return for each of the run's kinds of bodies the entry of the scene's list `particle` it comes from.
+
+    An entry with a spread makes several kinds, one for each size; all such entries make equally many.
+    """
+    listed, count = run.scene["particle"], len(run.manifest.kinds or ())
+    spread = [bool(entry.get("spread")) for entry in listed]
+    sizes = (count - spread.count(False)) // max(spread.count(True), 1)
+    return [number for number, several in enumerate(spread) for _ in range(sizes if several else 1)]
+
+
+def _entry_names(run: Run) -> dict[int, str]:
+    return {number: f"{number} {entry['shape']}" for number, entry in enumerate(run.scene["particle"])}
+
+
+def _kind_names(run: Run) -> dict[int, str]:
+    """Return the names of all kinds that have bodies, with the length of one body."""
+    kinds = enumerate(run.manifest.kinds or ())
+    return {number: f"{number} {kind.shape} {1e3 * kind.length_m:.3g} mm" for number, kind in kinds if kind.bodies}
 
 
 def _speed(frame: Frame, run: Run) -> Floats:
@@ -138,14 +162,27 @@ FIELDS: tuple[Field, ...] = (
         lambda frame, _: frame.link if frame.bars is not None else np.tile(np.arange(LINKS), (frame.count, 1)),
         kind="name",
         of="link",
+        names=lambda run: dict(enumerate(LINK_NAMES)) if run.manifest.kinds is None else {},
+    ),
+    Field(
+        "entry",
+        "-",
+        "entry of the scene's list `particle` that the body is made from; scenes with the key particle",
+        lambda frame, run: np.array(entries(run))[frame.kind],
+        kind="name",
+        available_for=lambda run: run.manifest.kinds is not None,
+        label="entry of the scene's particle",
+        names=_entry_names,
     ),
     Field(
         "kind",
         "-",
-        "kind of the body, a place in `kinds` of run.json; scenes with the key particle",
+        "kind of the body, a place in `kinds` of run.json; an entry with a spread makes one kind for each size; scenes "
+        "with the key particle",
         lambda frame, _: frame.kind,
         kind="name",
         available_for=lambda run: run.manifest.kinds is not None,
+        names=_kind_names,
     ),
     Field("speed_m_per_s", "m/s", "of the smarticle's centre of mass", _speed, label="speed of its centre of mass"),
     Field(

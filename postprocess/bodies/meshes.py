@@ -1,7 +1,7 @@
 """Make meshes [m] of the bodies of a run in a frame: links, walls, floor, hooks, strings, forces.
 
 Meshes have the coordinates of the frames, z upwards: a shaken container moves. They have the sizes of the simulation.
-A wall without a height in the scene ends above the highest smarticle; walls and strings have no thickness.
+A wall without a height in the scene ends above the highest smarticle; walls, plate and strings have no thickness.
 """
 
 import math
@@ -33,6 +33,7 @@ with warnings.catch_warnings():
     import pyvista as pv
 
 
+PLATE = "plate_z_m"  #: Series of the height of the plate
 _STRAIN, _ARRANGE = "strain", "arrange"
 
 
@@ -103,6 +104,19 @@ class RunBoundaries:
         start, end, speed = self.lift
         raised = speed * (min(max(time, start), end) - start)
         return raised if raised <= top else None
+
+
+def plate_height(run: Run, time: float) -> float | None:
+    """Return the height of the plate's lower face above the floor [m] at a time [s]; None while there is no plate.
+
+    The sample of the series that is nearest in time decides whether there is a plate.
+    """
+    if not run.has_series or PLATE not in run.series:
+        return None
+    series = run.series
+    height = series[PLATE] - series["container_z_m"]
+    there = np.isfinite(height)
+    return float(np.interp(time, series.time[there], height[there])) if there[series.nearest(time)] else None
 
 
 def _start(run: Run, index: int, series: Series | None) -> float | None:
@@ -192,6 +206,7 @@ KINDS: Mapping[str, str] = MappingProxyType(
         "wall": "wall of the container, tiers and ceilings of a mould, or the two walls of a channel",
         "floor": "floor of the container",
         "hooks": "the two crosses",
+        "plate": "the lower face of the plate of a phase compress, while there is a plate",
         "strings": "the two strings of a strain test, as lines",
         "crossings": "on request: a point and a vector for each link that passes through a smarticle's plane",
         "forces": "on request: lines from centre to contact to centre, where the run records forces",
@@ -313,11 +328,17 @@ class Bodies:
     def _floor(self, frame: Frame) -> pv.PolyData | None:
         if self.run.manifest.planar:
             return None
+        return self._disc(frame.floor_z)
+
+    def _plate(self, frame: Frame) -> pv.PolyData | None:
+        height = plate_height(self.run, frame.time)
+        return None if height is None else self._disc(frame.floor_z + height)
+
+    def _disc(self, height: float) -> pv.PolyData:
+        """Return a horizontal disc over the whole container and all bodies, at a height [m]."""
         radius = max(self.run.manifest.container_radius_m, self._reach)
-        floor: pv.PolyData = pv.Disc(
-            center=(0.0, 0.0, frame.floor_z), inner=0, outer=radius, c_res=_ROUND
-        ).triangulate()
-        return floor
+        disc: pv.PolyData = pv.Disc(center=(0.0, 0.0, height), inner=0, outer=radius, c_res=_ROUND).triangulate()
+        return disc
 
     def _hooks(self, frame: Frame) -> pv.PolyData | None:
         settings = self.run.scene.get("hooks")

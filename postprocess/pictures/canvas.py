@@ -6,6 +6,7 @@ Pictures are drawn at twice their size and scaled down. No display is needed: VT
 import ctypes
 import math
 import os
+import pwd
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -46,6 +47,9 @@ _EDGE = "#7d8f9f"
 _PALE = 0.15  # opacity of smarticles if forces are drawn
 # In `Style.unit`: height of the captions, of scale and colour bar, margin, size of title and text.
 _HEAD, _FOOT, _MARGIN, _TITLE, _TEXT = 11.5, 10.0, 2.6, 2.5, 1.9
+_LEFT_OF_BAR, _MOST_OF_WIDTH = 0.45, 0.97  # left and right end of colour bar and legend, over the panel's width
+_LEGEND_TOP = 7.6  # height of the legend's title, in `Style.unit`
+_LEGEND_ROWS, _LEGEND_COLUMNS = 3, 3
 _LEAST_UNIT = 4.4  # so that text stays readable [pixel]
 _LETTER = 0.62  # width of a letter over its height
 _LIGHTS = ((-0.6, 1.1, 0.85), (0.9, 0.35, 0.32), (0.0, 0.0, 0.25))  # right, up, intensity
@@ -151,11 +155,13 @@ def union(extents: Sequence[Floats]) -> Floats:
     return np.stack([np.min(extents, axis=0)[0], np.max(extents, axis=0)[1]])
 
 
-def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, colours: NDArray[np.uint8]) -> None:
+def add_bodies(
+    plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame | None, colours: NDArray[np.uint8]
+) -> None:
     """Draw the meshes of a frame in a window of PyVista, in place of all bodies drawn before.
 
     `meshes` are the meshes by kind, as of `visible_meshes`. `colours` (N, 3, 3) uint8 are the sRGB colours of the
-    links.
+    links; without a frame they are those of the cells of the smarticles, (C, 3).
     """
     pale = "forces" in meshes
     for kind in (*PAINTS, "ghost"):
@@ -163,14 +169,14 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
             plotter.renderer.remove_actor(name, render=False)
     for kind, mesh in meshes.items():
         options = {"name": kind, "reset_camera": False, "render": False, "culling": False}
-        if kind in {"wall", "floor", "ghost"}:
+        if kind in {"wall", "floor", "plate", "ghost"}:
             # Coinciding points would be drawn as edges.
             edges = mesh.clean(tolerance=1e-6).extract_feature_edges(feature_angle=30, manifold_edges=False)
             opacity = 0.3 if kind == "ghost" else 1.0
             line = {"color": _EDGE, "line_width": 1.8 * _OVERSAMPLING, "lighting": False, "opacity": opacity}
             plotter.add_mesh(edges, **(options | line | {"name": f"{kind} edges"}))
         if kind == "smarticles":
-            mesh.point_data["colour"] = at_points(mesh, colours[owners(mesh, frame)])
+            mesh.point_data["colour"] = at_points(mesh, colours if frame is None else colours[owners(mesh, frame)])
             options |= {"scalars": "colour", "rgb": True, "opacity": _PALE if pale else 1.0, "specular": 0.12}
             # Hidden back faces would take a quarter of a film's time.
             options |= {"culling": not pale and "back", "ambient": 0.22, "diffuse": 0.85, "specular_power": 20}
@@ -179,7 +185,8 @@ def add_bodies(plotter: Any, meshes: Mapping[str, pv.PolyData], frame: Frame, co
             options |= {"show_edges": boxes, "edge_color": "#101418", "edge_opacity": 0.55, "line_width": _OVERSAMPLING}
         elif kind != "ghost":
             grazed = kind == "floor"  # light at grazing incidence would leave it black
-            options |= {"color": PAINTS[kind].colour, "opacity": PAINTS[kind].opacity, "lighting": kind != "wall"}
+            lit = kind not in {"wall", "plate"}
+            options |= {"color": PAINTS[kind].colour, "opacity": PAINTS[kind].opacity, "lighting": lit}
             options |= {"ambient": 0.45 if grazed else 0.25, "diffuse": 0.6 if grazed else 0.8}
         if kind != "ghost":
             plotter.add_mesh(mesh, **options)
@@ -190,21 +197,24 @@ class Canvas:
 
     RunError if this machine lacks the libraries to draw without a display. The extent (2, 2) in the camera's view is in
     [mm]. The link size of `run` sets the range of the shading of corners (ambient occlusion), which takes most of the
-    time of a picture and is left out by `quick`. Without `scale` there is no colour bar.
+    time of a picture; it is left out by `quick`, or without a run. Without `scale` there is neither colour bar nor
+    legend.
     """
 
     def __init__(
         self,
         style: Style,
         extent: Floats,
-        run: Run,
+        run: Run | None,
         *,
         columns: int = 1,
         scale: ColourScale | None = None,
         quick: bool = False,
     ) -> None:
         check_graphics()
+        quiet_mesa()
         self._style, self._columns = style, columns
+        self._again = 2 * quick  # VTK puts the labels of a bar right from the third drawing; shading has several
         self.size = style.size[0] * columns, style.size[1]
         self.pixel = style.pixel(extent)
         # Captions are higher than the bars below, so the centre is not that of the picture.
@@ -225,15 +235,18 @@ class Canvas:
                 for aside, rise, strength in _LIGHTS:
                     lamp = pv.Light(position=(aside, rise, 1.0), intensity=strength, light_type="camera light")
                     plotter.add_light(lamp, only_active=True)
-                if not quick:
+                if run is not None and not quick:
                     plotter.enable_ssao(
                         radius=0.6 * run.manifest.middle_length_m * MILLIMETRE,
             bias=0.4 * run.manifest.thickness_in_plane_m * MILLIMETRE,
                         kernel_size=64, blur=True,
                     )  # fmt: skip
             self.turn(style.axes)
+            self._swatches: list[tuple[tuple[float, float], tuple[int, ...]]] = []  # lower left [pixel] and colour
             if scale is not None and scale.colours is not None:
                 self._add_colour_bar(scale, scale.colours)
+            elif scale is not None and scale.labels:
+                self._add_legend(scale)
             self._length = round_length(0.2 * style.size[0] * self.pixel)
             at = self._bar[2] + style.unit, self._bar[3]
             self._write(0, "scale", f"{self._length:g} mm", at, _TEXT)
@@ -265,12 +278,12 @@ class Canvas:
     def show(
         self,
         column: int,
-        frame: Frame,
+        frame: Frame | None,
         meshes: Mapping[str, pv.PolyData],
         colours: NDArray[np.uint8],
         caption: Sequence[str] = (),
     ) -> None:
-        """Show the meshes of a frame in a panel, with colours of the links, sRGB (N, 3, 3), uint8.
+        """Show the meshes of a frame in a panel, with colours as for `add_bodies`.
 
         The first line of the caption is the title.
         """
@@ -292,22 +305,37 @@ class Canvas:
         """Return the picture of all panels."""
         with quiet_vtk():
             self._plotter.render()
+            for _ in range(self._again):
+                self._plotter.render_window.Render()
+            self._again = 0
             image = Image.fromarray(self._plotter.screenshot(return_img=True)).reduce(_OVERSAMPLING)
         left, top, right, bottom = self._bar
-        ImageDraw.Draw(image).rectangle((left, self.size[1] - top, right, self.size[1] - bottom), fill=figures.BLACK)
+        draw = ImageDraw.Draw(image)
+        draw.rectangle((left, self.size[1] - top, right, self.size[1] - bottom), fill=figures.BLACK)
+        side = _TEXT * self._style.unit
+        for (x, y), colour in self._swatches:
+            draw.rectangle((x, self.size[1] - y - side, x + side, self.size[1] - y), fill=colour)
         return image
 
     def _write(
-        self, column: int, name: str, text: str, at: tuple[float, float], size: float, *, bold: bool = False
+        self,
+        column: int,
+        name: str,
+        text: str,
+        at: tuple[float, float],
+        size: float,
+        *,
+        bold: bool = False,
+        width: float = math.inf,
     ) -> None:
         """Write a line at a position from the lower left [pixel]; shrink or cut it if it is too long.
 
         `column` is the number of the run, from the left; `size` is the font size, over `Style.unit`. A new line
-        replaces the line with its `name`.
+        replaces the line with its `name`. `width` is the longest line [pixel]; none is longer than to the right edge.
         """
-        (x, y), width = at, self._style.size[0]
+        x, y = at
         text = "".join(letter if letter.isprintable() else "?" for letter in text)
-        points, room = size * self._style.unit, (width - x) / _LETTER
+        points, room = size * self._style.unit, min(width, self._style.size[0] - x) / _LETTER
         points = min(points, max(room / max(len(text), 1), 0.6 * points))
         if len(text) * points > room:
             text = f"{text[: int(room / points) - 1]}…"
@@ -327,10 +355,30 @@ class Canvas:
         self._plotter.subplot(0, self._columns - 1)
         self._plotter.add_scalar_bar(
             self._style.field.title, mapper=mapper, vertical=False, n_labels=0, color=figures.BLACK, render=False,
-            position_x=0.45, position_y=3.2 * self._style.unit / height, width=0.52,
+            position_x=_LEFT_OF_BAR, position_y=3.2 * self._style.unit / height, width=_MOST_OF_WIDTH - _LEFT_OF_BAR,
             height=5.6 * self._style.unit / height,
             title_font_size=round(_TEXT * unit), label_font_size=round(_TEXT * unit), use_opacity=False,
         )  # fmt: skip
+
+    def _add_legend(self, scale: ColourScale) -> None:
+        """Write the names of values with their colours in columns below the picture; too many names are cut."""
+        unit, (wide, _), last = self._style.unit, self._style.size, self._columns - 1
+        left, line = _LEFT_OF_BAR * wide, 1.2 * _TEXT * unit
+        names, most = list(scale.labels.items()), _LEGEND_ROWS * _LEGEND_COLUMNS
+        shown = names if len(names) <= most else names[: most - 1]
+        columns = math.ceil(min(len(names), most) / _LEGEND_ROWS)
+        width = (_MOST_OF_WIDTH - _LEFT_OF_BAR) * wide / columns
+        top = _LEGEND_TOP * unit
+        self._write(last, "legend", self._style.field.title, (left, top), _TEXT)
+        for number in range(min(len(names), most)):
+            x, y = left + number // _LEGEND_ROWS * width, top - (1 + number % _LEGEND_ROWS) * line
+            text = f"and {len(names) - len(shown)} more"
+            if number < len(shown):
+                value, text = shown[number]
+                colour = tuple(scale.painted(np.array(value)).tolist())
+                self._swatches.append(((x + last * wide, y), colour))
+            indent = 1.5 * _TEXT * unit
+            self._write(last, f"legend {number}", text, (x + indent, y), _TEXT, width=width - 1.2 * indent)
 
 
 def round_length(most: float) -> float:
@@ -360,6 +408,20 @@ def check_graphics() -> None:
     raise RunError(
         "cannot draw: no display and no libEGL.so.1; apt-get install libegl1 libgl1-mesa-dri, or see smarticles doctor"
     )
+
+
+def quiet_mesa() -> None:
+    """Leave out Mesa's cache of shaders where its folder cannot be made; Mesa would print a line at each try."""
+    given = os.environ.get("MESA_SHADER_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    try:
+        # Mesa takes the home directory of the user, not $HOME, and without either it has no cache.
+        folder = Path(given or Path(pwd.getpwuid(os.getuid()).pw_dir, ".cache"))
+        folder.mkdir(parents=True, exist_ok=True)
+        usable = os.access(folder, os.W_OK)
+    except (KeyError, OSError):
+        usable = False
+    if not usable:
+        os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")
 
 
 @contextmanager

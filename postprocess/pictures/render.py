@@ -169,7 +169,7 @@ def turntable(directory: Path | str, *, views: int = 24, size: int = 560) -> lis
     style = Style.of([subject.run], color_by=None, size=(size, size), view=None)
     around = [axes_from(VIEWS["front"][0] + 360.0 * number / views, 26.0) for number in range(views)]
     (values,) = subject.values([index], style)
-    colours = ColourScale.of(style.field, span([values])).painted(values)
+    colours = ColourScale.of(style.field, span([values]), [subject.run]).painted(values)
     images = []
     in_view = union([subject.extent([index], axes) for axes in around])
     with Canvas(replace(style, axes=around[0]), in_view, subject.run, quick=True) as canvas:
@@ -199,9 +199,10 @@ def pictures(
     for subject, shown in pairs:
         subject.bodies.hold(subject.frames[i] for i in shown)
     values = [dict(zip(shown, subject.values(shown, style), strict=True)) for subject, shown in pairs]
-    scale = ColourScale.of(style.field, _span(subjects, values, style, limits))
+    scale = ColourScale.of(style.field, _span(subjects, values, style, limits), [subject.run for subject in subjects])
     if not any(np.isfinite(each).any() for of_run in values for each in of_run.values()):
-        scale = replace(scale, labels={(scale.low + scale.high) / 2: "no values here: grey"})
+        middle = math.nan if scale.colours is None else (scale.low + scale.high) / 2
+        scale = replace(scale, labels={middle: "no values here: grey"})
     force = None
     if "forces" in subjects[0].bodies.kinds:
         each = (read_forces(subject.frames[i]).contacts.normal for subject, shown in pairs for i in shown)

@@ -45,7 +45,8 @@ scenes that actuate:
   motor_work_J [J]                     work of that motor since the start
   halted [-]                           1 if that motor is halted
 scenes with the key particle:
-  kind [-]                             kind of the body, a place in `kinds` of run.json"""
+  entry [-]                            entry of the scene's list `particle` that the body is made from
+  kind [-]                             kind of the body, a place in `kinds` of run.json; one for each size"""
 
 _ON_REQUEST = "crossings, forces, average_crossing_number"
 
@@ -57,7 +58,7 @@ def add(commands: Commands) -> None:
         export_run,
         summary="write a run for ParaView, OVITO, Blender, 3D printers or an archive, or a scene for LAMMPS",
         text=f"""
-Writes the boxes of all links, and wall, tiers, floor, hooks and strings at one time, in metres.
+Writes the boxes of all links, and wall, tiers, floor, hooks, plate and strings at one time, in metres.
 Existing files are never replaced. Formats:
 
   vtp        folder for ParaView with all fields below; run `paraview --script=show_in_paraview.py`
@@ -73,9 +74,9 @@ Existing files are never replaced. Formats:
   ro-crate   DIR/ro-crate-metadata.json, which makes the run directory a Workflow Run RO-Crate (profile
              Process Run Crate 0.5) for archives: program with versions, command, scene, times, files
 
-Bodies: smarticles, wall, floor, hooks, strings. --with crossings adds a point and a direction where a
-link passes through another smarticle's plane. --with forces adds lines through the contacts, for runs
-with recording.contact_forces.
+Bodies: smarticles, wall, floor, hooks, plate, strings. --with crossings adds a point and a direction
+where a link passes through another smarticle's plane. --with forces adds lines through the contacts,
+for runs with recording.contact_forces.
 
 Fields of each box:
 {_FIELDS}""",

@@ -8,13 +8,15 @@ from typing import Any
 
 from dem.display import progress_of
 from dem.errors import InputError
-from smarticles.command_line import Commands, add_options, positive_number, reader
+from smarticles.command_line import Commands, add_options, names, positive_number, reader
 
 _PICTURE_SUFFIX = ".png"
+_CHART_SUFFIXES = (".png", ".pdf", ".svg")
 _FILM_SUFFIXES = (".gif", ".webp", ".mp4")
 # Options that only films or only pictures accept, by their names in the parsed arguments.
 _OF_FILMS = {"fps": "--fps", "start": "--from", "end": "--to", "every": "--every"}
 _OF_PICTURES = {"time": "--time", "smarticle": "--smarticle"}
+_OF_BODIES = {"color_by": "--color-by", "clim": "--clim", "view": "--view", "size": "--size"}
 
 
 def _limits_of(text: str) -> tuple[float, float] | str:
@@ -40,11 +42,12 @@ def add(commands: Commands) -> None:
     render = commands.add(
         "render",
         render_run,
-        summary="draw a picture or a film of a run",
+        summary="draw a picture, a film or a chart of a run",
         text="""
-Draws the boxes of all smarticles, the cylinder cut open in front, hooks, strings and a scale bar. No
-display is needed. The suffix of the output chooses between a picture (.png) and a film (.gif, .webp,
-.mp4). A film plays at a constant speed, which is written on it.""",
+Draws the boxes of all smarticles, the cylinder cut open in front, hooks, plate, strings and a scale
+bar. No display is needed. The suffix of the output chooses between a picture (.png) and a film (.gif,
+.webp, .mp4). A film plays at a constant speed, which is written on it. Names of kinds are in a legend.
+With --series, draws recorded series against time instead, with phases as bands.""",
         examples="""\
   smarticles render runs/a                                   last frame, runs/a/render.png
   smarticles render runs/a --time 1.5 --color-by speed --output shaken.png
@@ -52,6 +55,7 @@ display is needed. The suffix of the output chooses between a picture (.png) and
   smarticles render runs/a --compare runs/b --output both.png
   smarticles render runs/a --forces --output chains.png
   smarticles render runs/a --smarticle 17 --output hooked.png
+  smarticles render runs/a --series com_height_m,kinetic_energy_J --output height.pdf
 """,
     )
     add_options(render, "directory")
@@ -69,7 +73,8 @@ display is needed. The suffix of the output chooses between a picture (.png) and
         render,
         "--color-by",
         help="crossings (default; number of links of others through the smarticle's plane), contacts, height, speed, "
-        "id (default for motion in a plane), or another field of `smarticles export`, such as local_packing_fraction",
+        "id (default for motion in a plane), entry (of the scene's list particle; default for mixtures), or another "
+        "field of `smarticles export`, such as local_packing_fraction",
     )
     render.add_argument(
         "--clim",
@@ -104,15 +109,26 @@ display is needed. The suffix of the output chooses between a picture (.png) and
         metavar="S",
         help="simulated time between two pictures of a film [s]; default: every frame, at most about 150 pictures",
     )
+    render.add_argument(
+        "--series",
+        type=names,
+        metavar="NAME,…",
+        help="draw these recorded series against time instead of bodies, such as com_height_m, into a .png, .pdf or "
+        ".svg; default: DIR/NAME.png",
+    )
     add_options(render, "--overwrite")
 
 
 def render_run(arguments: argparse.Namespace) -> int:
-    """Draw a picture or a film; return the exit status."""
+    """Draw a picture, a film or a chart; return the exit status."""
     output: Path | None = arguments.output
+    if arguments.series is not None:
+        return _chart(arguments)
     film = output is not None and output.suffix in _FILM_SUFFIXES
     if output is not None and not film and output.suffix != _PICTURE_SUFFIX:
         kinds = f"{_PICTURE_SUFFIX} for a picture, {', '.join(_FILM_SUFFIXES)} for a film"
+        if output.suffix in _CHART_SUFFIXES:
+            kinds += f"; bodies are drawn in pixels (--size 4000), and {output.suffix} is for charts (--series)"
         msg = f"--output {output}: {output.suffix!r} is no supported format; end the name in {kinds}"
         raise InputError(msg)
     for name, option in (_OF_PICTURES if film else _OF_FILMS).items():
@@ -143,6 +159,21 @@ def render_run(arguments: argparse.Namespace) -> int:
         with progress_of("drawing"):
             written = render.render_run(arguments.directory, output=output, **selection, **options)
         print(written)
+    return 0
+
+
+def _chart(arguments: argparse.Namespace) -> int:
+    """Draw recorded series against time; return the exit status."""
+    for name, option in (_OF_FILMS | _OF_PICTURES | _OF_BODIES).items():
+        if getattr(arguments, name) is not None:
+            raise InputError(f"{option}: is for pictures of bodies, and --series draws a chart; leave one of them out")
+    for name in ("compare", "forces"):
+        if getattr(arguments, name):
+            raise InputError(f"--{name}: is for pictures of bodies, and --series draws a chart; leave one of them out")
+    from postprocess.report.series import write_series  # noqa: PLC0415  (imports Matplotlib)
+
+    options = {"output": arguments.output, "overwrite": arguments.overwrite}
+    print(write_series(arguments.directory, arguments.series, **options))
     return 0
 
 

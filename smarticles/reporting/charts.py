@@ -11,30 +11,21 @@ from matplotlib.figure import Figure
 
 from dem.arrays import Array
 from postprocess.report.figures import BLACK, BLUE, GREY, ORANGE, new_figure, style
+from postprocess.report.series import Spans, shade, thinned
 from smarticles.reporting.page import data_url
 
-_BAND = "#f0f1f2"
-_MAX_POINTS = 400
 Groups = Mapping[str, tuple[Sequence[object], Sequence[float], Sequence[float]]]  #: x, means, errors by curve name
 
 
-def against_time(times: Array, values: Array, label: str, phases: Sequence[tuple[float, float, str]]) -> str:
+def against_time(times: Array, values: Array, label: str, phases: Spans) -> str:
     """Draw a quantity against time; return the chart as a data URL.
 
     Times (n,) are in [s], values (n,) in the unit of the label; phases are start [s], end [s] and type.
     """
     with style():
         figure, axes = _axes("time [s]", label)
-        for number, (start, end, kind) in enumerate(phases):
-            if number % 2:
-                axes.axvspan(start, end, color=_BAND, linewidth=0, zorder=0)
-            axes.text(
-                (start + end) / 2, 1.02, kind, ha="center", va="bottom", fontsize=5.5, color=GREY,
-                transform=axes.get_xaxis_transform(), parse_math=False, clip_on=False,
-            )  # fmt: skip
+        shade(axes, phases)
         axes.plot(*thinned(times, values), color=BLUE, linewidth=1.0)
-        if phases:
-            axes.set_xlim(phases[0][0], phases[-1][1])
         return _svg(figure)
 
 
@@ -68,21 +59,6 @@ def against_variable(variable: str, label: str, groups: Groups) -> str:
             for text in legend.get_texts():
                 text.set_parse_math(False)
         return _svg(figure)
-
-
-def thinned(times: Array, values: Array) -> tuple[Array, Array]:
-    """Reduce a curve to at most 400 points, without NaN; return its times and values.
-
-    A curve with more points, times (n,) and values (n,), is cut into 200 intervals with about equal numbers of points;
-    the points with the least and the greatest value of each interval are kept.
-    """
-    finite = np.isfinite(values)
-    times, values = times[finite], values[finite]
-    if len(times) <= _MAX_POINTS:
-        return times, values
-    intervals = np.array_split(np.arange(len(times)), _MAX_POINTS // 2)
-    kept = np.unique([index for s in intervals for index in (s[values[s].argmin()], s[values[s].argmax()])])
-    return times[kept], values[kept]
 
 
 def _axes(x: str, y: str) -> tuple[Figure, Axes]:

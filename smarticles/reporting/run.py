@@ -22,6 +22,7 @@ from dem.record.run import Run, open_run
 from dem.scene.reading import load_scene
 from dem.scene.scene import Scene
 from postprocess.measures.registry import Shown, shown_quantities
+from postprocess.report.series import spans_of
 from postprocess.statistics.points import format_with_error, marked
 from smarticles.command_line import format_cell
 from smarticles.measuring import has_frames, measured
@@ -173,13 +174,7 @@ def _curves(run: Run) -> list[Markup]:
     """Return charts of the recorded series against time; series that are always 0 are left out."""
     if not run.has_series:
         return []
-    series = run.series
-    spans = []
-    for phase in run.phases:
-        inside = series.time[series["phase"] == phase.index]
-        if len(inside):
-            start = float(inside[0]) if phase.start_s is None else phase.start_s
-            spans.append((start, float(inside[-1]) if phase.end_s is None else phase.end_s, phase.type))
+    series, spans = run.series, spans_of(run)
     blocks = []
     for name, factor, unit, component in _CURVES:
         if name not in series.data:

@@ -155,7 +155,16 @@ def test_vtp_lists_every_frame_with_its_time_and_all_fields(pile, tmp_path):
     assert [float(entry["timestep"]) for entry in listed] == pytest.approx(frames.times.tolist(), rel=1e-8)
     mesh = pv.read(folder / listed[-1]["file"])
     assert mesh.n_cells == 12 * 3 * 6
-    asked_for = {"angle_rad", "motor_torque_N_m", "motor_work_J", "halted", "normal_force_N", "force_chain", "kind"}
+    asked_for = {
+        "angle_rad",
+        "motor_torque_N_m",
+        "motor_work_J",
+        "halted",
+        "normal_force_N",
+        "force_chain",
+        "entry",
+        "kind",
+    }
     rigid = {field.name for field in FIELDS if not field.on_request} - asked_for
     assert set(mesh.cell_data.keys()) == rigid
     assert mesh.field_data["TimeValue"] == pytest.approx([frames.times[-1]])
@@ -248,8 +257,8 @@ def test_errors_are_one_line_and_leave_nothing(pile, asked, message):
 
 @pytest.mark.parametrize("suffix", ["vtp", "glb"])
 def test_a_file_of_nothing_is_rejected(pile, tmp_path, suffix):
-    # This run has neither hooks nor strings.
-    with pytest.raises(InputError, match="the run has no hooks, strings at this time; leave out less"):
+    # This run has neither hooks nor plate nor strings.
+    with pytest.raises(InputError, match="the run has no hooks, plate, strings at this time; leave out less"):
         export_run(pile, to=suffix, output=tmp_path / f"out.{suffix}", unwanted=["smarticles", "wall", "floor"])
     assert list(tmp_path.iterdir()) == [pile]
 

@@ -231,9 +231,13 @@ def test_warnings_of_a_run_are_warnings_of_python(tmp_path: Path) -> None:
 
 
 def test_errors_of_a_run_name_arguments(tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").touch()
     with pytest.raises(smarticles.InputError) as raised:
-        smarticles.run(scene_of(engine="links"), tmp_path / "a", resume=True)
-    assert str(raised.value) == f"out {tmp_path / 'a'}: holds no run to resume; leave resume=True out to start one"
+        smarticles.run(scene_of(engine="links"), tmp_path, resume=True)
+    assert (
+        str(raised.value)
+        == f"out {tmp_path}: holds files (notes.txt, …) and is left as it is; choose another directory"
+    )
 
 
 def test_the_recorded_command_names_a_scene_that_exists(tmp_path: Path) -> None:

@@ -18,8 +18,9 @@ from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from postprocess.pictures import render
 from postprocess.report import figures
+from postprocess.report.series import thinned
 from postprocess.statistics.points import means_by
-from smarticles.reporting.charts import Groups, against_variable, thinned
+from smarticles.reporting.charts import Groups, against_variable
 from smarticles.reporting.run import accuracy_blocks, effect_blocks
 from smarticles.reporting.sweep import _figures
 from smarticles.sweeps import make_folder

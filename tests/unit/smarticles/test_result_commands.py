@@ -201,6 +201,21 @@ def test_render_draws_a_film_of_a_part_in_fixed_colours(
         assert images.info["duration"] == 50
 
 
+def test_render_draws_charts_of_series(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    run, chart = write_run(tmp_path / "a"), tmp_path / "chart.pdf"
+    said = smarticles("render", run, "--series", "com_height_m,packing_fraction", "--output", chart)
+    assert (said.status, said.out) == (0, f"{chart}\n")
+    assert chart.read_bytes().startswith(b"%PDF")
+    assert smarticles("render", run, "--series", "com_height_m").out == f"{run / 'com_height_m.png'}\n"
+    said = smarticles("render", run, "--series", "com_height_m")
+    assert said.status == 2
+    assert "exists already" in said.err
+    assert smarticles("render", run, "--series", "com_height_m", "--overwrite").status == 0
+    said = smarticles("render", run, "--series", "height", "--output", tmp_path / "b.svg")
+    assert said.status == 2
+    assert "no series 'height'; choose one of: " in said.err
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -210,6 +225,10 @@ def test_render_draws_a_film_of_a_part_in_fixed_colours(
             "--smarticle 1: a single smarticle is drawn in pictures only; leave it out",
         ),
         (("--output", "film.avi"), "'.avi' is no supported format; end the name in .png for a picture"),
+        (("--output", "pile.pdf"), "bodies are drawn in pixels (--size 4000), and .pdf is for charts (--series)"),
+        (("--series", "count", "--view", "top"), "--view: is for pictures of bodies, and --series draws a chart"),
+        (("--series", "count", "--forces"), "--forces: is for pictures of bodies, and --series draws a chart"),
+        (("--series", "count", "--fps", "10"), "--fps: is for pictures of bodies, and --series draws a chart"),
         (("--clim", "5:1"), "must be LOW:HIGH, two numbers in order, or run: got '5:1'"),
         (("--size", "12y3"), "must be a number of pixels from 1, or two as in 1280x720: got '12y3'"),
     ],

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 import yaml
-from synthetic import RADIUS, T1, T2, SyntheticRun, W, u_shape, write_frame, write_manifest, write_run
+from synthetic import RADIUS, T1, T2, SyntheticRun, W, u_shape, write_frame, write_manifest, write_run, write_series
 from synthetic.hooked import AFTER_REST, LOWER, SPEED, UPPER, write_hooked_run
 
 from dem.record.frames import read_frames
 from dem.record.run import open_run
 from postprocess.bodies.fields import fields_of
-from postprocess.bodies.meshes import Bodies, checked_kinds, link_boxes, solid
+from postprocess.bodies.meshes import Bodies, checked_kinds, link_boxes, plate_height, solid
 from postprocess.measures.entanglement import link_crossings, link_passages
 
 ALL = checked_kinds(["crossings"], [])
@@ -135,6 +135,28 @@ def test_hooks_are_crosses_at_their_heights(hooked):
     for cross, height in ((lower, LOWER), (upper, UPPER + raised)):
         assert cross.bounds[:4] == pytest.approx((-W / 2, W / 2, -W / 2, W / 2))
         assert cross.bounds[4:] == pytest.approx((FLOOR + height - 2.5e-4, FLOOR + height + 2.5e-4), abs=2e-5)
+
+
+def test_the_plate_is_where_the_series_has_it_and_only_while_it_is_there(tmp_path):
+    """It comes down by 1 mm a second from 1.5 s to 3 s, in a container that is raised by 2 mm."""
+    kinds = ("deposit", "relax", "relax", "relax")
+    directory = write_run(tmp_path, SyntheticRun(phases=kinds, frames_per_phase=1, floor_z=FLOOR))
+    assert "plate" not in bodies_at(directory)
+    times = np.linspace(0.05, 2.5, 50)
+    plate = np.where((times > 1.55) & (times < 2.05), 0.010 - 1e-3 * times, np.nan)
+    container = np.full(len(times), 0.002)
+    columns = {"time_s": times, "phase": np.zeros(50, int), "plate_z_m": plate, "container_z_m": container}
+    write_series(directory, columns, seed=1)
+    assert [frame.time for frame in read_frames(directory)] == pytest.approx([1.0, 1.5, 2.0, 2.5])
+    assert ["plate" in bodies_at(directory, index) for index in range(4)] == [False, False, True, False]
+    found = bodies_at(directory, 2)
+    # The frame's floor is where the container is, whatever the series says of it.
+    assert found["plate"].bounds[4:] == pytest.approx((FLOOR + 0.006, FLOOR + 0.006))
+    assert found["plate"].bounds[:4] == found["floor"].bounds[:4]
+    run = open_run(directory)
+    assert plate_height(run, 2.0) == pytest.approx(0.006)
+    assert plate_height(run, 1.6) == pytest.approx(0.0064)
+    assert plate_height(run, 2.06) is None
 
 
 def test_a_plane_has_two_walls_and_no_floor(tmp_path):

@@ -1,6 +1,7 @@
 """Pictures are judged by their pixels; a scene is small and so is its picture."""
 
 import ctypes
+import os
 from unittest.mock import Mock
 
 import numpy as np
@@ -16,8 +17,8 @@ from dem.record.names import FORCE
 from postprocess.bodies.colours import ColourScale
 from postprocess.bodies.fields import BY_NAME
 from postprocess.geometry.links import centres_of_mass
-from postprocess.pictures.canvas import Canvas
-from postprocess.pictures.render import render_run
+from postprocess.pictures.canvas import Canvas, Style, Subject, quiet_mesa
+from postprocess.pictures.render import pictures, render_run
 
 SIZE = (240, 240)
 
@@ -173,3 +174,34 @@ def test_forces_are_drawn_where_they_are_recorded(tmp_path):
     look = {"size": SIZE, "view": "top", "color_by": "contacts"}
     image = panel(pixels(render_run(run, output=tmp_path / "a.png", forces=True, **look)))
     assert ((image[..., 0] > 100) & (image[..., 1] < 60)).sum() > 20
+
+
+def test_the_first_picture_of_a_film_has_its_colour_bar_as_the_others(run):
+    subject = Subject(run)
+    style = Style.of([subject.run], color_by="contacts", size=(500, 500), view=None)
+    first, second, third = (np.asarray(image) for image in pictures([subject], [[0, 0, 0]], style, quick=True))
+    assert (first == second).all()
+    assert (second == third).all()
+
+
+def test_mesa_is_told_of_a_folder_that_it_cannot_make(tmp_path, monkeypatch):
+    disable = "MESA_SHADER_CACHE_DISABLE"
+    for name in (disable, "MESA_SHADER_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    (tmp_path / "file").touch()
+    for name, folder, disabled in (
+        ("XDG_CACHE_HOME", tmp_path / "cache", False),
+        ("XDG_CACHE_HOME", tmp_path / "file" / "cache", True),
+        ("MESA_SHADER_CACHE_DIR", tmp_path / "file" / "cache", True),
+    ):
+        with monkeypatch.context() as changed:
+            changed.setenv(name, str(folder))
+            changed.setenv(disable, "")
+            changed.delenv(disable)
+            quiet_mesa()
+            assert (disable in os.environ) == disabled
+    with monkeypatch.context() as changed:
+        changed.setattr("pwd.getpwuid", Mock(side_effect=KeyError))  # a user without a home
+        changed.setenv(disable, "false")
+        quiet_mesa()
+        assert os.environ[disable] == "false"  # what the user has chosen
