@@ -225,6 +225,11 @@ class Frame:
         """(N,) kind of each body, as index of `Manifest.kinds`; 0 for smarticles."""
         return np.zeros(self.count, np.int64) if self.bars is None else self.bars.kind
 
+    @property
+    def normals(self) -> Array | None:
+        """(M, 3) normals of bars, zeros where the section is round [1]; None for smarticles."""
+        return None if self.bars is None else self.bars.normals
+
     @cached_property
     def _manifest(self) -> Manifest:
         return Manifest.read(self.directory / MANIFEST)
