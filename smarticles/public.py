@@ -25,7 +25,7 @@ from dem.scene.scene import Scene
 from dem.scene.stiffness import stiffness_for
 from dem.setting.contact import PRESET
 from dem.yaml_text import load_yaml, read_text
-from postprocess.measures.registry import FrameMeasure, measure_of
+from postprocess.measures.registry import FrameMeasure, Values, measure_of
 from smarticles.main import BAD_INPUT
 from smarticles.measuring import grouped, measured
 from smarticles.sweeps import compute, make_folder, raise_failures
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 #: A measure, or a function of a frame and its run, whose name ends with the unit of its value: `top_m`
-OwnMeasure = FrameMeasure | Callable[[Frame, Run], float]
+OwnMeasure = FrameMeasure | Callable[[Frame, Run], Values]
 
 # Options of the command line and keys of `vary`, as messages name them, and what Python calls them.
 _IN_PYTHON = (
@@ -93,7 +93,8 @@ class SweepDirectory(Sequence[Run]):
             by: columns, such as variables of the sweep. The result is then averaged over runs with equal values in
                 these columns; columns "… SE […]" have the standard errors over runs.
             frames: return one row per frame; cannot be combined with `by`.
-            measures: further measures; a function of a frame and its run returns a number.
+            measures: further measures; a function of a frame and its run returns a number, an array of numbers or a
+                dict of these.
             jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script.
 
         Returns:
@@ -159,8 +160,8 @@ def measure(
         run: run, or its directory.
         frames: return one row per frame.
         also: names of measures that tables have on request alone, such as "crossing-number".
-        measures: further measures; a function of a frame and its run returns a number. Its name ends with the unit:
-            `top_m` makes the column `top [m]`.
+        measures: further measures; a function of a frame and its run returns a number, an array of numbers or a dict of
+            these. Names of functions and of the dict's keys end with the unit: `top_m` makes the column `top [m]`.
 
     Returns:
         One row per phase, with means over its last frames and their standard errors, or one row per frame. Column

@@ -159,7 +159,10 @@ def _rows(
             "phase type": run.phases[frame.phase].type,
         }
         for measure in measures:
-            row |= measure.columns(frame if take_costly or not measure.costly else None, run)
+            columns = measure.columns(frame if take_costly or not measure.costly else None, run)
+            if twice := row.keys() & columns.keys():
+                raise InputError(f"measure {measure.name}: the table has a column {min(twice)!r} already; rename it")
+            row |= columns
         if series is not None:
             row |= _series_columns(series, frame.time)
         rows.append(row)
