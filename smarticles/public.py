@@ -26,8 +26,9 @@ from dem.scene.stiffness import stiffness_for
 from dem.setting.contact import PRESET
 from dem.yaml_text import load_yaml, read_text
 from postprocess.measures.registry import FrameMeasure, Values, measure_of
+from smarticles.labelled import dataset_of
 from smarticles.main import BAD_INPUT
-from smarticles.measuring import grouped, measured
+from smarticles.measuring import grouped, measured, of_phase
 from smarticles.sweeps import compute, make_folder, raise_failures
 from templates.local import environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
@@ -107,6 +108,23 @@ class SweepDirectory(Sequence[Run]):
             raise InputError("by: averages over phases of runs; leave frames out")
         table = measured([self.path], frames=frames, measures=[measure_of(one) for one in measures], jobs=jobs)
         return table if by is None else grouped(table, [by] if isinstance(by, str) else list(by))
+
+    def to_xarray(self, *, phase: str = "last", measures: Sequence[OwnMeasure] = (), jobs: int = 1) -> Any:
+        """Return the measures of one phase of all runs as a `Dataset` of xarray, see `dataset_of`.
+
+        Args:
+            phase: type of phase; "last": the last phase of each run.
+            measures: further measures, as for `table`.
+            jobs: number of processes, as for `table`.
+
+        Raises:
+            InputError: xarray is not installed, no run has frames yet, or no run has the phase.
+        """
+        table = self.table(measures=measures, jobs=jobs)
+        # A run may have several phases of one type.
+        table = of_phase(table, phase).drop_duplicates("run", keep="last")
+        known = {str(self.folder.run(entry)): entry.values for entry in self.folder.entries}
+        return dataset_of(table, [known[str(run)] for run in table["run"]])
 
 
 def run(
