@@ -42,8 +42,7 @@ def measure_run(
         costly: Frames for which costly measures are computed: "never" none, "phase-end" the last recorded frame of each
             phase, "every-frame" all.
         measures: Further measures, whose columns follow those of the registered ones.
-        also: Names of measures that tables have on request alone, such as "crossing-number"; they are computed for every
-            frame.
+        also: Names of measures that tables have on request alone, such as "crossing-number", computed for every frame.
 
     Returns:
         A table with one row per frame and units in its column names. Columns of `series.h5`, if that file exists, have
