@@ -26,6 +26,15 @@ def test_random_points_in_a_cylinder_give_1_at_all_distances(sizes):
     assert found[0].radius_m == pytest.approx(1.0, abs=0.01)
 
 
+def test_the_cylinder_is_that_of_the_points_also_if_they_are_few():
+    random = np.random.default_rng(4)
+    found = [radial_distribution(random_points(10, random), longest=1.0, bins=1) for _ in range(600)]
+    # The outermost of 10 points has 10/11 of the area, and their heights span 9/11 of the height on average.
+    assert np.mean([one.radius_m**2 for one in found]) == pytest.approx(1.0, abs=0.02)
+    assert np.mean([one.top_m - one.bottom_m for one in found]) == pytest.approx(2.0, abs=0.05)
+    assert np.mean([one.bottom_m for one in found]) == pytest.approx(0.0, abs=0.03)
+
+
 def test_all_pairs_are_within_the_size_of_the_cylinder():
     found = radial_distribution(random_points(50, np.random.default_rng(0)), longest=math.hypot(2, 2), bins=40)
     assert found.pairs.sum() == 50 * 49 / 2
