@@ -12,7 +12,7 @@ number of the body of each; `segments_of` returns both for a frame, `read_centre
 from dem.record.forces import RecordedForces, read_forces
 from dem.record.frame import Frame, read_frame
 from dem.record.frames import FrameSequence, read_frames
-from dem.record.poses import RecordedPoses
+from dem.record.kinematics import RecordedPoses
 from dem.record.run import Run, open_run
 from dem.record.series import Series, read_series
 from postprocess.geometry.centrelines import Centrelines, read_centrelines

@@ -21,8 +21,8 @@ from dem.body.particle import LINKS, Particle
 from dem.body.state import BarState, PileState
 from dem.record.document import Manifest
 from dem.record.files import cannot_read
+from dem.record.kinematics import RecordedPoses, poses_of_bars, poses_of_bodies
 from dem.record.names import FRAME, MANIFEST, SCENE, VTKHDF, collection
-from dem.record.poses import RecordedPoses, poses_of_bars, poses_of_bodies
 from dem.record.vtkhdf import REMEDY, read_step
 
 VERTICES = 4
