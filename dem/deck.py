@@ -54,8 +54,8 @@ def passive(scene: Scene) -> State:
     first.ready(scene)
     poses = poses_of(scene, first.taken)
     turns, zero = np.array([turn.as_matrix() for turn in poses.rotations]), np.zeros_like(poses.positions)
-    state = State.rigid(scene.particle.boxes, poses.positions, turns, zero, zero)
-    spheres = state.spheres(scene.particle)
+    state = State.rigid(scene.body.boxes, poses.positions, turns, zero, zero)
+    spheres = state.spheres(scene.body)
     owners = np.repeat(np.arange(len(spheres)), spheres.shape[1])
     near = cKDTree(spheres.reshape(-1, 3))
     pairs = near.query_pairs(scene.sphere_diameter * (1 - DEEPEST), output_type="ndarray")
@@ -97,12 +97,12 @@ def write_deck(scene: Scene, folder: Path) -> None:
         folder.mkdir()
     except OSError as error:
         raise InputError(f"--output {folder}: cannot be made ({error.strerror}); choose another place") from None
-    spheres, zero = state.spheres(scene.particle), np.zeros((state.count, 3))
-    turns = np.asarray(state.link_rotations[:, 1] @ scene.particle.boxes.link_rotations[1].T)
+    spheres, zero = state.spheres(scene.body), np.zeros((state.count, 3))
+    turns = np.asarray(state.link_rotations[:, 1] @ scene.body.boxes.link_rotations[1].T)
     title = f"Spheres of {len(spheres)} smarticles, {spheres.shape[1]} each: {_one_line(scene.name)}"
     contents = {
-        DATA: text.sphere_lines([scene.particle] * state.count, scene.cylinder, spheres, title=title),
-        BODIES: text.body_lines([scene.particle] * state.count, Moving(state.positions, turns, zero, zero, zero, zero)),
+        DATA: text.sphere_lines([scene.body] * state.count, scene.cylinder, spheres, title=title),
+        BODIES: text.body_lines([scene.body] * state.count, Moving(state.positions, turns, zero, zero, zero, zero)),
         DECK: _deck(scene),
     }
     for name, lines in contents.items():
@@ -110,11 +110,11 @@ def write_deck(scene: Scene, folder: Path) -> None:
 
 
 def _deck(scene: Scene) -> Iterator[str]:
-    law, boxes, first = contact_law_of(scene), scene.particle.boxes, scene.phases[0]
+    law, boxes, first = contact_law_of(scene), scene.body.boxes, scene.phases[0]
     assert isinstance(first, TakeOver)
     d, dt, cylinder = scene.sphere_diameter, min(time_steps(scene)), scene.cylinder
-    each = len(scene.particle.centres)
-    before_box, neighbours = "\n".join(text.before_box(scene.particle)), "\n".join(text.neighbours(scene.particle))
+    each = len(scene.body.centres)
+    before_box, neighbours = "\n".join(text.before_box(scene.body)), "\n".join(text.neighbours(scene.body))
     between, at_wall = text.contact_terms(law, boxes.mass)
     container = "\n".join(text.container(cylinder, at_wall))
     frame = _steps(scene.recording.frame_interval_s, dt)

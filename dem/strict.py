@@ -4,6 +4,7 @@ import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
+from numbers import Integral, Real
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -20,9 +21,31 @@ _UNITS = {
 }
 _TAGS = ("type", "shape", "law")  # keys that say which member of a union a mapping is
 _TAG_OF = {"particle": "shape", "joints": "law"}  # the one that a key needs; all others need `type`
+_OTHER_WORDS = {
+    **dict.fromkeys(("tap", "taps", "tapping"), ("shake", ", with the key taps")),
+    **dict.fromkeys(("vibrate", "vibration", "jolt"), ("shake", "")),
+    **dict.fromkeys(("pour", "drop", "fill", "insert", "create", "rain"), ("deposit", "")),
+    **dict.fromkeys(("wait", "rest", "settle", "equilibrate", "hold"), ("relax", "")),
+    **dict.fromkeys(("press", "squeeze", "piston"), ("compress", "")),
+    **dict.fromkeys(("pull", "hook"), ("pull-hook", "")),
+    **dict.fromkeys(("stretch", "elongate"), ("tension", "")),
+    **dict.fromkeys(("collapse", "remove-wall", "open"), ("remove-container", "")),
+    **dict.fromkeys(("restart", "continue", "load"), ("take-over", "")),
+    **dict.fromkeys(("gait", "move", "swing"), ("actuate", "")),
+    **dict.fromkeys(("stick", "bar", "needle", "cylinder"), ("rod", "")),
+    **dict.fromkeys(("worm", "fibre", "fiber", "polymer"), ("filament", "")),
+    "u": ("staple", ", which has the form of a smarticle"),
+}
+"""Words for types of phases and for shapes that users try, with the known word and what to add to it."""
 _OF_A_KEY = "[key]"  # last step of pydantic's path if the key itself is wrong
 # A message that begins with a key is about that key, within the place that pydantic reports.
 _OWN_KEY = re.compile(r"\w[\w.]*(?=: )")
+SAME = 1e-9
+"""Ratio below which two numbers differ by rounding alone [-].
+
+Sums and products in double precision, such as 0.1 + 0.2, are off by some 1e-16; files state numbers that differ with
+fewer than nine digits."""
+
 _LONGEST_KEY = 60  # characters of a key that are shown
 _MOST_ERRORS = 3  # shown at once
 
@@ -147,6 +170,21 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
     return "; also ".join(lines[:_MOST_ERRORS]) + more
 
 
+def equal(one: Any, other: Any) -> bool:
+    """Return whether two values of files are equal: numbers to `SAME`, whole ones exactly; a boolean is no number."""
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(equal(value, other[key]) for key, value in one.items())
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return len(one) == len(other) and all(map(equal, one, other))
+    if isinstance(one, bool) or isinstance(other, bool):
+        return one is other
+    if isinstance(one, Integral) and isinstance(other, Integral):
+        return int(one) == int(other)
+    if isinstance(one, Real) and isinstance(other, Real):
+        return math.isclose(float(one), float(other), rel_tol=SAME)
+    return bool(one == other)
+
+
 def unit_of(key: str) -> tuple[str, str]:
     """Split a key into name and unit: ("speed", "m/s") for `speed_m_per_s`."""
     words = key.split("_")
@@ -171,12 +209,15 @@ def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit:
     # Of several near words the one that begins alike is meant: relax, not release, by 'relaks'.
     close = difflib.get_close_matches(chosen, words) if isinstance(chosen, str) else []
     close.sort(key=lambda word: -sum(str(chosen).startswith(word[: k + 1]) for k in range(len(word))))
+    other, addition = _OTHER_WORDS.get(chosen.lower(), ("", "")) if isinstance(chosen, str) else ("", "")
+    if other not in words:
+        other, addition = (close[0], "") if close else ("", "")
     length = len(value) if hasattr(value, "__len__") else 0
     items, least, most = (
         f"{count} item" + ("s" if count != 1 else "")
         for count in (length, context.get("min_length"), context.get("max_length"))
     )
-    return _TEXTS[kind].format(
+    text = _TEXTS[kind].format(
         **context,
         shown=shown(value),
         shown_tag=shown(context.get("tag")),
@@ -189,8 +230,14 @@ def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit:
         least=least,
         most=most,
         text_way_out="write it in quotes" if number else "write some",
-        choice=f"did you mean {close[0]!r}?" if close else f"use {choices}",
+        choice=f"did you mean {other!r}{addition}?" if other else f"use {choices}",
     )
+    return text + (in_radians(value) if unit == "deg" and "out of range" in text else "")
+
+
+def in_radians(angle: float) -> str:
+    """Return, as the end of a message, what a wrong number of degrees would be in radians; "" if it is too large."""
+    return f"; {angle:g} rad are {math.degrees(angle):.4g} deg" if 0 < abs(angle) <= 2 * math.pi else ""
 
 
 def _place(steps: Sequence[int | str], data: Any) -> tuple[str, bool]:

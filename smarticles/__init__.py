@@ -17,11 +17,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    import postprocess as measures
     from dem.errors import InputError, RunError
     from dem.record.run import Run
     from dem.scene.reading import load_scene
     from dem.scene.scene import Scene
+    from smarticles import measures
     from smarticles.public import SweepDirectory, measure, plot, read, read_sweep, run, sweep
 
     __version__: str
@@ -57,7 +57,7 @@ if not TYPE_CHECKING:  # hidden from type checkers, which would accept any name
 
     def __getattr__(name: str) -> object:
         if name == "measures":
-            value: object = import_module("postprocess")
+            value: object = import_module("smarticles.measures")
         elif name == "__version__":
             from importlib.metadata import version  # noqa: PLC0415  (slow to import)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from functools import partial
@@ -11,6 +11,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dem.display import Steps, silent
 from dem.errors import InputError, nearest
 from dem.record.names import FRAME, OF_SWEEP, VTKHDF, collection
 from smarticles.kept_tables import keep, key_of, read_kept
@@ -79,7 +80,7 @@ def measured(
     also: Sequence[str] = (),
     measures: Sequence[FrameMeasure] = (),
     jobs: int = 1,
-    progress: Callable[[int, int], None] = lambda _done, _runs: None,
+    progress: Steps = silent,
 ) -> pd.DataFrame:
     """Measure runs and sweeps; tables of runs that have not changed since are read from their directories.
 
@@ -92,8 +93,7 @@ def measured(
             there.
         jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the
             processes import it.
-        progress: function that is called after each measured run, with the number of runs measured so far and the
-            number of runs to measure.
+        progress: function that is called after each measured run.
 
     Returns:
         One table of all runs, with units in the column names. The variables of a sweep follow the first column, `run`.
@@ -118,7 +118,7 @@ def measured(
         made = each(take, missing, [keys[directory] for directory in missing])
         for number, (directory, table) in enumerate(zip(missing, made, strict=True), start=1):
             tables[directory] = table
-            progress(number, len(missing))
+            progress("runs measured", number, len(missing))
     return pd.concat(
         [_with_variables(table, found[run]) for run, table in tables.items() if table is not None], ignore_index=True
     )

@@ -2,37 +2,42 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
+import signal
 import subprocess
 import tempfile
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, overload
 
 import pandas as pd
 import yaml
 
-from dem.errors import InputError, RunError
+from dem.display import Display
+from dem.errors import InputError, RunError, shown
 from dem.record.frame import Frame
 from dem.record.names import SCENE
+from dem.record.progress import row_of
 from dem.record.run import Run, open_run
-from dem.scene.reading import SCHEMA_VERSION, dump_scene
-from dem.scene.scene import Scene
-from dem.scene.stiffness import stiffness_for
+from dem.scene.reading import dump_scene
+from dem.scene.scene import SCHEMA_VERSION, Scene
 from dem.setting.contact import PRESET
 from dem.yaml_text import load_yaml, read_text
 from postprocess.measures.registry import FrameMeasure, Values, measure_of
 from smarticles.labelled import dataset_of
 from smarticles.main import BAD_INPUT
-from smarticles.measuring import grouped, measured, of_phase
+from smarticles.measuring import grouped, measured, of_phase, values_in
 from smarticles.sweeps import compute, make_folder, raise_failures
 from templates.local import environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
-from templates.sweep.from_scene import as_template
+from templates.sweep.from_scene import variables, varied_template
 from templates.sweep.sweep_file import SEED
 
 if TYPE_CHECKING:
@@ -41,23 +46,34 @@ if TYPE_CHECKING:
 #: A measure, or a function of a frame and its run, whose name ends with the unit of its value: `top_m`
 OwnMeasure = FrameMeasure | Callable[[Frame, Run], Values]
 
+#: Values by key of the scene, with dots for nested keys; in place of a list, a mapping of names to values
+Varied = Mapping[str, Sequence[Any] | Mapping[str, Any]]
+
 # Options of the command line and keys of `vary`, as messages name them, and what Python calls them.
 _IN_PYTHON = (
     (r"--resume\b", "resume=True"),
     (r"--(threads|ranks|jobs) (\d+)", r"\1=\2"),
     (r"--(out|threads|ranks|jobs)\b", r"\1"),
-    (r"--set ([\w.]+)='\{\{ \w+ \}\}'", r"vary: \1"),
     (r"smarticles-\w+/scene\.yaml\.j2, rendered for run", "vary: run"),
     (r"smarticles-\w+/sweep\.yaml", "vary"),
     (r"smarticles-\w+/scene\.yaml(\.j2)?", "scene"),
 )
 
 
-@dataclass(frozen=True)
+_WARNING = "smarticles: warning: "  # begins warnings of the command
+_POLL_S = 0.25  # between two readings of the progress of a run
+
+
+@dataclass(frozen=True, repr=False)
 class SweepDirectory(Sequence[Run]):
     """Directory of a sweep: a sequence of its runs, and tables of their measures."""
 
     folder: Folder  #: Manifest and entries of the sweep
+
+    def __repr__(self) -> str:
+        """Return directory, number of runs and values of the variables in one line."""
+        listed = "; ".join(f"{name}: {_few(values)}" for name, values in values_in(self.folder).items())
+        return f"<SweepDirectory {str(self.path)!r}, {len(self)} runs, {listed}>"
 
     @property
     def path(self) -> Path:
@@ -85,6 +101,7 @@ class SweepDirectory(Sequence[Run]):
         *,
         by: str | Sequence[str] | None = None,
         frames: bool = False,
+        also: Sequence[str] = (),
         measures: Sequence[OwnMeasure] = (),
         jobs: int = 1,
     ) -> pd.DataFrame:
@@ -94,6 +111,7 @@ class SweepDirectory(Sequence[Run]):
             by: columns, such as variables of the sweep. The result is then averaged over runs with equal values in
                 these columns; columns "… SE […]" have the standard errors over runs.
             frames: return one row per frame; cannot be combined with `by`.
+            also: names of measures that tables have on request alone, such as "crossing-number".
             measures: further measures; a function of a frame and its run returns a number, an array of numbers or a
                 dict of these.
             jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script.
@@ -106,21 +124,29 @@ class SweepDirectory(Sequence[Run]):
         """
         if by is not None and frames:
             raise InputError("by: averages over phases of runs; leave frames out")
-        table = measured([self.path], frames=frames, measures=[measure_of(one) for one in measures], jobs=jobs)
+        table = measured([self.path], frames=frames, also=_names(also), measures=_measures(measures), jobs=jobs)
         return table if by is None else grouped(table, [by] if isinstance(by, str) else list(by))
 
-    def to_xarray(self, *, phase: str = "last", measures: Sequence[OwnMeasure] = (), jobs: int = 1) -> Any:
+    def to_xarray(
+        self,
+        *,
+        phase: str = "last",
+        also: Sequence[str] = (),
+        measures: Sequence[OwnMeasure] = (),
+        jobs: int = 1,
+    ) -> Any:
         """Return the measures of one phase of all runs as a `Dataset` of xarray, see `dataset_of`.
 
         Args:
             phase: type of phase; "last": the last phase of each run.
+            also: names of measures on request, as for `table`.
             measures: further measures, as for `table`.
             jobs: number of processes, as for `table`.
 
         Raises:
             InputError: xarray is not installed, no run has frames yet, or no run has the phase.
         """
-        table = self.table(measures=measures, jobs=jobs)
+        table = self.table(also=also, measures=measures, jobs=jobs)
         # A run may have several phases of one type.
         table = of_phase(table, phase).drop_duplicates("run", keep="last")
         known = {str(self.folder.run(entry)): entry.values for entry in self.folder.entries}
@@ -128,23 +154,33 @@ class SweepDirectory(Sequence[Run]):
 
 
 def run(
-    scene: Scene | Path | str, out: Path | str, *, threads: int = 1, ranks: int | None = None, resume: bool = False
+    scene: Scene | Mapping[str, Any] | Path | str,
+    out: Path | str,
+    *,
+    threads: int = 1,
+    ranks: int | None = None,
+    resume: bool = False,
+    progress: bool = True,
 ) -> Run:
     """Run a scene in a new process, as `smarticles run` does, and return the finished run.
 
-    A new process is needed because YADE and PyVista must not be loaded in one process.
+    A new process is needed because YADE and PyVista must not be loaded in one process. Its warnings,
+    such as of values that are probably mistakes, become warnings of Python.
 
     Args:
-        scene: scene, or path of a scene file.
+        scene: scene, its keys as a mapping, or path of a scene file.
         out: run directory. It must be absent or empty; with `resume` it may hold an unfinished run of this scene.
         threads: number of threads of YADE. Results are reproducible bit by bit with one thread only.
         ranks: number of MPI processes of LAMMPS; None: 1, or with `resume` the number at the start.
         resume: continue an unfinished run from its last checkpoint.
+        progress: show a bar on the terminal or in the notebook; elsewhere a line every 30 s.
 
     Raises:
         InputError: the scene is not valid, or `out` contains other files.
         RunError: the run failed or was stopped.
+        KeyboardInterrupt: Ctrl-C stopped the run; all its files are complete.
     """
+    scene = _scene_or_file(scene)
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch, _in_words_of_python(scratch):
         file = Path(scratch, "scene.yaml") if isinstance(scene, Scene) else Path(scene)
         if isinstance(scene, Scene):
@@ -154,14 +190,53 @@ def run(
         if isinstance(scene, Scene):
             # The file in the temporary folder will not exist; `scene.yaml` in the run directory will.
             words += ["--recorded-as", shlex.join(["smarticles", "run", str(Path(out) / SCENE), "--out", "NEW"])]
-        done = subprocess.run(
-            words, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False
-        )
-        if done.returncode:
-            lines = done.stderr.strip().splitlines() or [f"exit status {done.returncode}, without a message"]
+        with Path(scratch, "said").open("w+", encoding="utf-8") as said:
+            # In a session of its own: Ctrl-C reaches this process alone, which signals the run once.
+            process = subprocess.Popen(
+                words, env=environment(), stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
+            )
+            status = _wait(process, Path(out), progress=progress)
+            said.seek(0)
+            lines = [line for line in said.read().splitlines() if line.startswith("smarticles: ")]
+        if status:
+            lines = lines or [f"exit status {status}, without a message"]
             text = lines[-1].removeprefix("smarticles: ").removeprefix("error: ")
-            raise InputError(text) if done.returncode == BAD_INPUT else RunError(text)
+            raise InputError(text) if status == BAD_INPUT else RunError(text)
+    for line in lines:
+        if line.startswith(_WARNING):
+            warnings.warn(line.removeprefix(_WARNING), stacklevel=2)
     return Run(Path(out))
+
+
+def _scene_or_file(given: Scene | Mapping[str, Any] | Path | str) -> Scene | Path:
+    if isinstance(given, Mapping):
+        return Scene(**{str(key): value for key, value in given.items()})
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    if isinstance(given, Scene):
+        return given
+    raise InputError(f"scene: {shown(given)} is none; give a Scene, its keys as a mapping, or the path of a scene file")
+
+
+def _wait(process: subprocess.Popen[bytes], out: Path, *, progress: bool) -> int:
+    """Wait for the process of a run and return its exit status; show the progress in the run directory `out`.
+
+    After Ctrl-C, the run closes its files before KeyboardInterrupt is raised; Ctrl-C again kills it.
+    """
+    with Display() if progress else nullcontext() as display:
+        try:
+            while True:
+                if display is not None:
+                    display.update(row_of(Run(out).progress))
+                with suppress(subprocess.TimeoutExpired):
+                    return process.wait(_POLL_S)
+        except KeyboardInterrupt:
+            process.send_signal(signal.SIGINT)
+            process.wait()
+            raise KeyboardInterrupt(f"{out}: stopped; go on with smarticles.run(…, resume=True)") from None
+        finally:
+            if process.poll() is None:
+                process.kill()
 
 
 def read(directory: Path | str) -> Run:
@@ -189,7 +264,33 @@ def measure(
         InputError: the directory is not a run directory, the run has no frames yet, or a name is unknown.
     """
     directory = run.path if isinstance(run, Run) else Path(run)
-    return measured([directory], frames=frames, also=also, measures=[measure_of(one) for one in measures])
+    return measured([directory], frames=frames, also=_names(also), measures=_measures(measures))
+
+
+def _names(also: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(also, str):
+        raise InputError(f"also: {also!r} is one name; give a list, [{also!r}]")
+    return tuple(also)
+
+
+def _measures(given: Sequence[OwnMeasure]) -> list[FrameMeasure]:
+    """Return measures, made from functions where they are functions; InputError if one is neither."""
+    if callable(given):
+        raise InputError(f"measures: {shown(given)} is no list; write it in brackets, measures=[…]")
+    for one in [given] if isinstance(given, str) else given:
+        if isinstance(one, str):
+            raise InputError(
+                f"measures: {one!r} is text; give functions of a frame and its run; tables have all other measures "
+                "anyway, and those on request by also=[…]"
+            )
+        if not isinstance(one, FrameMeasure) and not hasattr(one, "__name__"):
+            raise InputError(f"measures: {shown(one)} is no function with a name; write one, `def top_m(frame, run)`")
+    return [measure_of(one) for one in given]
+
+
+def _few(values: Sequence[Any], most: int = 6) -> str:
+    more = f", … ({len(values)})" if len(values) > most else ""
+    return f"{', '.join(map(str, values[:most]))}{more}"
 
 
 def plot(run: Run | Path | str, *, time: float | None = None, color_by: str | None = None) -> Image:
@@ -231,20 +332,24 @@ def read_sweep(directory: Path | str) -> SweepDirectory:
 
 
 def sweep(
-    what: Scene | Path | str,
+    what: Scene | Mapping[str, Any] | Path | str,
     out: Path | str,
     *,
-    vary: Mapping[str, Sequence[Any]] | None = None,
+    vary: Varied | None = None,
+    zip: Varied | None = None,  # noqa: A002  (as in sweep files)
     jobs: int | None = None,
 ) -> SweepDirectory:
     """Compute the missing runs of a sweep on this machine, and return the finished sweep.
 
     Args:
-        what: path of a sweep file; with `vary` a scene or the path of a scene file.
+        what: path of a sweep file; with `vary` or `zip` a scene, its keys as a mapping, or the path of a scene file.
         out: directory of the sweep; may hold an unfinished part of this sweep.
         vary: values by key of the scene, with dots for nested keys. All combinations are run. The last word of a key is
             the name of the variable: {"smarticle.aspect_ratio": [0.4, 0.7], "seed": [1, 2, 3]} has the variables
-            `aspect_ratio` and `seed`.
+            `aspect_ratio` and `seed`. Values may have names, which tables and names of runs then show:
+            {"particle": {"rods": {"shape": "rod", "length_m": 0.02}, "smarticles": "smarticle"}}.
+        zip: the same for keys that change together: one point for the first values of all keys, one for the second
+            ones, and so on. With `vary` all combinations of these points and its values are run.
         jobs: number of simultaneous runs; None: one per core.
 
     Raises:
@@ -252,11 +357,15 @@ def sweep(
         RunError: a run failed.
     """
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch, _in_words_of_python(scratch):
-        if vary is None and isinstance(what, Scene):
-            raise InputError("vary: is missing; give the keys of the scene that change, e.g. vary={'seed': [1, 2, 3]}")
-        file = write_sweep(what, vary, Path(scratch)) if vary is not None else Path(str(what))
-        # Without a sweep file, `resume` continues from the scenes in the directory.
-        words = ["sweep", str(file), "--out", str(out), "--submit", "local"] if vary is None else ["resume", str(out)]
+        scene = _scene_or_file(what)
+        if vary is None and zip is None:
+            if isinstance(scene, Scene):
+                msg = "vary: is missing; give the keys of the scene that change, e.g. vary={'seed': [1, 2, 3]}"
+                raise InputError(msg)
+            file, words = scene, ["sweep", str(scene), "--out", str(out), "--submit", "local"]
+        else:
+            # Without a sweep file, `resume` continues from the scenes in the directory.
+            file, words = write_sweep(scene, vary or {}, Path(scratch), zip or {}), ["resume", str(out)]
         again = shlex.join(["smarticles", *words])
         folder = make_folder(file, Path(out), again)
     raise_failures(folder, compute(folder, jobs=jobs, command=again))
@@ -275,53 +384,38 @@ def _in_words_of_python(scratch: str) -> Iterator[None]:
         raise type(error)(text) from None
 
 
-# -- sweep file and template for `vary` ------------------------------------------------------------------------------
+# -- sweep file and template for `vary` and `zip` -------------------------------------------------------------------
 
 
-def write_sweep(scene: Scene | Path | str, vary: Mapping[str, Sequence[Any]], folder: Path) -> Path:
+def write_sweep(scene: Scene | Path | str, vary: Varied, folder: Path, zipped: Varied = MappingProxyType({})) -> Path:
     """Write `sweep.yaml` and its template `scene.yaml.j2` into a folder; return the path of `sweep.yaml`.
 
-    The sweep has all combinations of the values in `vary`, which has the form of the argument `vary` of `sweep`.
+    `vary` and `zipped` have the form of the arguments `vary` and `zip` of `sweep`.
     """
-    if not vary:
+    changing = variables(vary, zipped)
+    if not changing:
         raise InputError("vary: is empty; give a key of the scene and its values, e.g. {'seed': [1, 2, 3]}")
-    data = _explicit_keys(scene) if isinstance(scene, Scene) else _read_scene_file(Path(scene))
-    # A variable is named by the last word of its key, or by all words if two keys end alike.
-    last = [key.rpartition(".")[2] for key in vary]
-    names = {
-        key: word if last.count(word) == 1 and not word.isdigit() else key.replace(".", "_")
-        for key, word in zip(vary, last, strict=True)
+    if isinstance(scene, Scene):
+        data, source = {"schema_version": SCHEMA_VERSION, **scene.given}, "scene"
+    else:
+        data, source = _read_scene_file(Path(scene)), str(scene)
+    (folder / "scene.yaml.j2").write_text(varied_template(data, changing, source), encoding="utf-8")
+    points = {
+        kind: {one.name: list(one.values) for one in changing if one.source == source and one.name != SEED}
+        for kind, source in (("zip", "zip"), ("grid", "vary"))
     }
-    text = as_template(data, names, "scene" if isinstance(scene, Scene) else str(scene))
-    (folder / "scene.yaml.j2").write_text(text, encoding="utf-8")
-    grid = {name: list(vary[key]) for key, name in names.items() if name != SEED}
+    seeds = [one.values for one in changing if one.name == SEED]
     content: dict[str, Any] = {
         "schema_version": 1,
         "name": str(data.get("name", "sweep")),
         "template": "scene.yaml.j2",
-        "run_name": "_".join(f"{name}{{{{ {name} }}}}" for name in names.values()),
-        "points": {"grid": grid} if grid else {"list": [{}]},
-        **({"repeats": {"seeds": list(vary[SEED])}} if SEED in names.values() else {}),
+        "run_name": "_".join(one.in_run_name for one in changing),
+        "points": {kind: lists for kind, lists in points.items() if lists} or {"list": [{}]},
+        **({"repeats": {"seeds": list(seeds[0])}} if seeds else {}),
     }
     file = folder / "sweep.yaml"
     file.write_text(yaml.safe_dump(content, sort_keys=False, allow_unicode=True), encoding="utf-8")
     return file
-
-
-def _explicit_keys(scene: Scene) -> dict[str, Any]:
-    """Return the keys that were set explicitly in a scene, with their values, as nested mappings.
-
-    Keys of `fidelity` are left out if their values follow from the rest of the scene, since varied keys may change
-    these.
-    """
-    data = scene.model_dump(mode="json", exclude_unset=True)
-    if "fidelity" in data:
-        derived = dict(scene.named_knobs)
-        if scene.smooth:
-            derived["stiffness_N_per_m"] = max(derived["stiffness_N_per_m"], stiffness_for(scene))
-        differing = {key: value for key, value in data["fidelity"].items() if derived.get(key) != value}
-        data["fidelity"] = {**differing, "base": scene.fidelity.base}
-    return {"schema_version": SCHEMA_VERSION, **data}
 
 
 def _read_scene_file(path: Path) -> dict[str, Any]:

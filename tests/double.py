@@ -325,7 +325,7 @@ class EngineDouble:
     def of(cls, scene: Demand, time_step: float) -> EngineDouble:
         """The double that a scene calls for."""
         engine = cls(
-            particle=scene.particle,
+            particle=scene.body,
             cylinder=scene.cylinder,
             gravity=scene.gravity_m_per_s2,
             time_step=time_step,

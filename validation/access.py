@@ -73,7 +73,7 @@ class _Access:
         """Build an engine for articulated smarticles of a scene, with a time step `dt` [s] or the scene's own."""
         law, dt = contact_law_of(scene), dt or time_step(scene)
         height, motors = scene.cylinder.height, self.motors_of(scene)
-        return self.build(scene.particle, law, dt=dt, gravity=gravity, height=height, **motors)
+        return self.build(scene.body, law, dt=dt, gravity=gravity, height=height, **motors)
 
 
 def _bar(length: float, thickness: float, radius: float, kind: type[Particle] = Particle) -> Particle:

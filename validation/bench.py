@@ -84,7 +84,7 @@ def swing(seconds: float) -> dict[str, Any]:
 
 def law_of(scene: Scene) -> ContactLaw:
     """Return the contact law of a scene."""
-    return contact_law(scene.particle, scene.contact, scene.fidelity.stiffness_N_per_m)
+    return contact_law(scene.body, scene.contact, scene.fidelity.stiffness_N_per_m)
 
 
 def ball_law(
@@ -161,7 +161,7 @@ def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -
     scene = scene_of(data)
     Path(out).mkdir(parents=True, exist_ok=True)
     engine = engine_kind(scene.engine).build(scene, time_step(scene) if dt is None else dt)
-    progress = ProgressWriter(Path(out), scene.count, show=False)
+    progress = ProgressWriter(Path(out), scene.count)
     return scene, engine, build_recorder(scene, Path(out), progress)
 
 
@@ -188,4 +188,4 @@ def fastest(engine: Engine) -> float:
 
 def lying(scene: Scene) -> float:
     """Return the height of the centre of mass of a smarticle lying flat on the floor [m]."""
-    return float(scene.particle.radius - scene.particle.centres[:, 2].min())
+    return float(scene.body.radius - scene.body.centres[:, 2].min())

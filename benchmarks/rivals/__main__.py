@@ -125,10 +125,8 @@ def measured(scene: Scene, shape: str, positions: Array, frames: Array) -> dict[
     [m] and axes (2 + F, N, 3, 3, 3), in columns, of the links are at the times that `Outcome.positions` states.
     """
     before, rested, *acting = zip(positions, frames, strict=True)
-    depths = np.array(
-        [[deepest(solid_of(kind, scene.particle, *pose)) for kind in (shape, "boxes")] for pose in acting]
-    )
-    boxes, radius = scene.particle.boxes, scene.container.radius_m
+    depths = np.array([[deepest(solid_of(kind, scene.body, *pose)) for kind in (shape, "boxes")] for pose in acting])
+    boxes, radius = scene.body.boxes, scene.container.radius_m
 
     def packed(positions: Array, frames: Array) -> float:
         still = np.zeros_like(positions)

@@ -53,7 +53,7 @@ class Task:
     @property
     def boxes(self) -> Boxes:
         """Geometry and mass of a smarticle."""
-        return self.scene.particle.boxes
+        return self.scene.body.boxes
 
     @property
     def rest_s(self) -> float:

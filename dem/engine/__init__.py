@@ -1,3 +1,3 @@
 """Engines, which are running simulations behind one interface."""
 
-ENGINES = ("yade", "links", "lammps")  #: Names of the engines, the default first
+ENGINES = ("links", "yade", "lammps")  #: Names of the engines, the default first

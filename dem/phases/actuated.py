@@ -246,7 +246,7 @@ def _of_barbs(scene: SceneView, index: int) -> Iterator[str]:
             f"smarticle.aspect_ratio: 0 means no barbs, which phases.{index} ({scene.phases[index].kind}) is to move; "
             "use a larger aspect_ratio or leave the phase out"
         )
-    has_spheres = np.isin(BARB_LINKS, scene.particle.links).all()
+    has_spheres = np.isin(BARB_LINKS, scene.body.links).all()
     if not has_spheres or _first_station(scene) < diameter * (1 - TOLERANCE):
         # The first sphere of a barb begins where the hinge's sphere ends, and the last one ends at the tip.
         least = (1.5 + HINGE_CLEARANCE) * diameter
@@ -259,7 +259,7 @@ def _of_barbs(scene: SceneView, index: int) -> Iterator[str]:
 
 def _first_station(scene: SceneView) -> float:
     """Return the distance of the barbs' first sphere from the hinge, along the barb [m]."""
-    particle = scene.particle
+    particle = scene.body
     barb = particle.centres[particle.links == BARB_LINKS[0]] - particle.boxes.vertices[1]
     return float(np.hypot(barb[:, 0], barb[:, 1]).min())
 
@@ -356,7 +356,7 @@ def _of_first_spheres(scene: SceneView, index: int, angle: float) -> Iterator[st
     """
     if angle <= 90 or scene.smooth:
         return
-    particle, d = scene.particle, scene.sphere_diameter
+    particle, d = scene.body, scene.sphere_diameter
     s = _first_station(scene)
     arms = particle.centres[particle.links == 1] - particle.boxes.vertices[1]
     m = np.unique(np.round(np.hypot(arms[:, 0], arms[:, 1]) / d, 9))[1:] * d  # the first is the hinge's own

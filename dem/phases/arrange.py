@@ -45,7 +45,7 @@ class Arrange(Part, Phase):
             )
         # The widest chain is hooked tip to tip, with barbs at right angles; if it turns as a whole, the length of a
         # middle link is added.
-        widest = 2 * scene.particle.boxes.barb_length + scene.smarticle.middle_length_m
+        widest = 2 * scene.body.boxes.barb_length + scene.smarticle.middle_length_m
         if width > widest:
             yield (
                 f"plane.width_m: H = {width:g} m, h/H = {chain.width / width:.3g}, is beyond the stroke of the servos: "
@@ -66,4 +66,4 @@ def chain_of(scene: SceneView) -> Chain:
     """Return the layout of the chain with which a scene begins."""
     first = scene.phases[0]
     assert isinstance(first, Arrange)  # the caller has checked
-    return Chain(scene.particle, scene.count, first.gap_m)
+    return Chain(scene.body, scene.count, first.gap_m)

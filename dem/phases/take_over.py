@@ -260,7 +260,7 @@ def poses_of(scene: SceneView, taken: Taken) -> Poses:
     """Return the poses of a scene's smarticles from a frame; raise InputError if it does not fit them."""
     for mismatch in _mismatches(scene, taken):
         raise InputError(mismatch)
-    return fitted_poses(scene.particle.boxes, taken.vertices)[0]
+    return fitted_poses(scene.body.boxes, taken.vertices)[0]
 
 
 def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
@@ -297,7 +297,7 @@ def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
             f"container.radius_m: {scene.container.radius_m:g} m; {beyond.sum()} smarticles of {taken}, {taking}, "
             f"reach out of it, up to {off_axis.max():.4g} m from the axis; use a wider container or another run"
         )
-    lowest = float(_within_tips(vertices, scene.particle.radius)[..., 2].min())
+    lowest = float(_within_tips(vertices, scene.body.radius)[..., 2].min())
     if heights.max() > cylinder.height or lowest < 0:
         yield (
             f"container.height_m: {cylinder.height:.4g} m, but the smarticles of {taken}, {taking}, lie at "
@@ -310,7 +310,7 @@ def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
                 f"hooks.{name}_height_m: {cross.height:g} m; {inside.sum()} smarticles of {taken}, {taking}, lie in "
                 "this hook; take over a run that was poured with these hooks"
             )
-    _, deviations = fitted_poses(scene.particle.boxes, vertices)
+    _, deviations = fitted_poses(scene.body.boxes, vertices)
     if deviations.max() <= MOST_OFF * scene.sphere_diameter:
         return
     angles = _angles(taken)
@@ -318,7 +318,7 @@ def _mismatches(scene: SceneView, taken: Taken) -> Iterator[str]:
     reached = " and ".join(f"{a:.4g}° … {b:.4g}°" for a, b in zip(low, high, strict=True))
     (first, second), middle = scene.smarticle.angles_deg, (low + high) / 2
     # A scene can describe barbs whose angles are equal on all smarticles.
-    spread = math.radians(float((high - low).max()) / 2) * scene.particle.boxes.barb_length
+    spread = math.radians(float((high - low).max()) / 2) * scene.body.boxes.barb_length
     way_out = (
         f"use smarticle.angles_deg: [{middle[0]:.4g}, {middle[1]:.4g}]"
         if spread < MOST_OFF * scene.sphere_diameter

@@ -100,7 +100,7 @@ def _reasons(scene: Scene) -> Mapping[EffectName, tuple[bool, str]]:
         energies = "recording.dissipation_interval_s is given, and the energy ledger needs them"
     waits = [
         f"; phase {index} waits until all are slower than {speed:g} m/s, "
-        f"{speed / math.sqrt(gravity * scene.model.size):.2g} √(g {'w' if scene.shapes is None else 'longest bar'})"
+        f"{speed / math.sqrt(gravity * scene.model.size):.2g} √(g {'w' if scene.particle is None else 'longest bar'})"
         for index, phase in enumerate(scene.phases)
         if isinstance(phase, Deposit | TakeOver) and (speed := phase.settle.speed_m_per_s)
     ]

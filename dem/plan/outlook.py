@@ -6,6 +6,7 @@ from typing import Any, Self
 
 from dem.engine.effect import Adds
 from dem.engine.kinds import engine_kind
+from dem.plan.doubts import doubts_of
 from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
 from dem.scene.scene import Scene
@@ -205,6 +206,7 @@ def warnings_of(scene: Scene) -> tuple[str, ...]:
     # Several phases may give equal warnings.
     return (
         *dict.fromkeys(of_phases),
+        *doubts_of(scene),
         *recording_warnings(scene),
         *engine_warnings(scene),
         *_step_warnings(scene),

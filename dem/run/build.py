@@ -93,7 +93,7 @@ def _frame_writer(scene: Scene, out: Path) -> FrameWriter:
     if scene.mixture is not None:
         radii = [kind.radius if kind.rows == 1 else mean_width(*kind.thicknesses) / 2 for kind in scene.mixture.kinds]
         return OneFileWriter(out, radii=radii, kind="kind")
-    particle, boxes = scene.particle, scene.smarticle.boxes
+    particle, boxes = scene.body, scene.smarticle.boxes
     if particle.chain.rows == 1 and not boxes.bulge:
         return OneFileWriter(out, radii=[particle.radius] * LINKS)
     radii = [mean_width(boxes.thickness_normal, in_plane) / 2 for in_plane in boxes.thicknesses_in_plane]

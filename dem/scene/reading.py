@@ -1,9 +1,11 @@
 """Read scenes from files, change their keys by `--set`, and write, hash and compare scenes."""
 
+import copy
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -13,15 +15,15 @@ from pydantic import ValidationError
 
 from dem.errors import InputError, shown
 from dem.record.names import SCENE
-from dem.scene.scene import Scene
+from dem.scene.keys import put
+from dem.scene.scene import ENGINE_OF_VERSION_1, SCHEMA_VERSION, Scene
 from dem.setting.contact import PRESET
 from dem.setting.fidelity import FIDELITIES
 from dem.strict import explained
 from dem.yaml_text import load_yaml, parse_yaml, read_text
 
-SCHEMA_VERSION = 1
+VERSIONS = (1, SCHEMA_VERSION)  # that are read; scenes are written in version 1, as earlier programs read them
 MOST_DIFFERENCES = 3  # keys that are shown where two scenes differ
-DEFAULT_ENGINE = "yade"
 ADDED_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
     {"shake": {"moves": "container"}, "deposit": {"every_s": None, "thrown_at_m_per_s": 0.0}}
 )
@@ -64,18 +66,21 @@ def _not_a_scene(data: Any) -> str | None:
         return "is a sweep file, which makes many scenes; give it to `smarticles sweep`"
     if "schema_version" not in data:
         # Only scenes made in Python may leave the version out.
-        return "schema_version: missing; it has no default"
+        return f"schema_version: missing; write `schema_version: {SCHEMA_VERSION}`"
     version = data["schema_version"]
-    if isinstance(version, int) and version != SCHEMA_VERSION:
-        return f"schema_version: {shown(version)} is not known here; this version reads {SCHEMA_VERSION}"
+    if isinstance(version, int) and version not in VERSIONS:
+        return f"schema_version: {shown(version)} is not known here; use {' or '.join(map(str, VERSIONS))}"
     return None
 
 
-def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
+def load_scene(
+    path: Path | str, overrides: Sequence[str] = (), *, check: Callable[[Scene], object] = lambda _: None
+) -> Scene:
     """Return the scene of a file.
 
     Args:
         overrides: changes of keys as `KEY=VALUE`, e.g. `phases.1.duration_s=2`.
+        check: function that raises InputError for scenes to reject, besides those that are not valid.
 
     Raises:
         InputError: the file cannot be read or is not YAML, an override is wrong, or the scene is not valid.
@@ -97,9 +102,45 @@ def load_scene(path: Path | str, overrides: Sequence[str] = ()) -> Scene:
     if problem:
         raise InputError(f"{path}: {problem}; {way_out}")
     data = parse_yaml(text, str(path))
+
+    def checked(some: Any) -> Scene:
+        scene = parse_scene(some, source=str(path), folder=path.parent)
+        try:
+            check(scene)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
+        return scene
+
+    changed = copy.deepcopy(data)
     for override in overrides if isinstance(data, Mapping) else ():
+        apply_override(changed, override)
+    try:
+        return checked(changed)
+    except InputError as error:
+        culprit = _culprit(data, overrides, checked) if isinstance(data, Mapping) else None
+        if culprit is None:
+            raise
+        raise InputError(f"--set {culprit}: {str(error).removeprefix(f'{path}: ')}") from None
+
+
+def _culprit(data: Any, overrides: Sequence[str], checked: Callable[[Any], Scene]) -> str | None:
+    """Return the last override with which a valid scene became invalid; None if there is none.
+
+    `checked` raises InputError for data of an invalid scene. `data` is changed in place.
+    """
+
+    def is_valid() -> bool:
+        with suppress(InputError):
+            checked(data)
+            return True
+        return False
+
+    culprit, valid = None, bool(overrides) and is_valid()
+    for override in overrides:
         apply_override(data, override)
-    return parse_scene(data, source=str(path), folder=path.parent)
+        before, valid = valid, is_valid()
+        culprit = override if before and not valid else culprit
+    return culprit
 
 
 def apply_override(data: Any, override: str) -> None:
@@ -114,38 +155,27 @@ def apply_override(data: Any, override: str) -> None:
         value = load_yaml(text)
     except yaml.YAMLError:
         raise InputError(f"--set {override}: the value is not valid YAML") from None
-    node: Any = data
-    parts = key.split(".")
-    for number, part in enumerate(parts, 1):
-        last = number == len(parts)
-        step: Any = int(part) if isinstance(node, list) and part.isdigit() else part
-        if not isinstance(node, dict) and not (isinstance(node, list) and isinstance(step, int) and step < len(node)):
-            raise InputError(f"--set {override}: there is no {part!r} in the scene; lists are numbered from 0")
-        if last:
-            node[step] = value
-        elif isinstance(node, dict):
-            if part == "fidelity" and isinstance(node.get(part), str):
-                node[part] = {"base": node[part]}
-            node = node.setdefault(part, {})
-        else:
-            node = node[step]
+    try:
+        put(data, key, value)
+    except InputError as error:
+        raise InputError(f"--set {override}: {str(error).removeprefix(f'{key}: ')}") from None
 
 
 def _plain(scene: Scene) -> dict[str, Any]:
-    """Return the resolved scene as plain data, without default values of keys added to the format later.
+    """Return the resolved scene as plain data of version 1, without default values of keys that were added later.
 
     Without such keys, among them `ADDED_KEYS` and `NEWER_KEYS`, the hashes of older scenes do not change. A scene with
     a protocol keeps `packing_radius_m` and `ADDED_KEYS`, since the protocol may have filled them in. A scene of other
     bodies than smarticles has no key `smarticle`.
     """
-    data = scene.model_dump(mode="json")
+    data = {**scene.model_dump(mode="json"), "schema_version": VERSIONS[0]}
     smarticle = data["smarticle"]
     optional: list[tuple[dict[str, Any], Mapping[str, Any]]] = [
-        (data, {"engine": DEFAULT_ENGINE, "particle": None, "liquid": None}),
+        (data, {"engine": ENGINE_OF_VERSION_1, "particle": None, "liquid": None}),
         (data["recording"], {"contact_forces": False, "frames": "vtu"}),
         (smarticle, {"middle_thickness_in_plane_m": None}),
     ]
-    if scene.shapes is not None:
+    if scene.particle is not None:
         del data["smarticle"]
         optional = [entry for entry in optional if entry[0] is not smarticle]
         filaments = [shape for shape in data["particle"] if shape["shape"] == "filament"]

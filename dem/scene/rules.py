@@ -153,7 +153,7 @@ def _of_body(scene: SceneView) -> Iterator[str]:
         yield f"{key} in a scene without the key plane; links of their own thickness move in a plane, or leave it out"
     if scene.smooth:
         yield f"{key} on engine: links, where all links have one thickness; use engine: yade, or leave it out"
-    particle = scene.particle
+    particle = scene.body
     least = particle.barb_start + particle.radius
     if particle.boxes.bulge and 0 < particle.boxes.barb_length < least:
         yield (

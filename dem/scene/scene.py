@@ -9,7 +9,6 @@ from typing import Any, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import (
-    ConfigDict,
     Field,
     ModelWrapValidatorHandler,
     ValidationError,
@@ -18,7 +17,7 @@ from pydantic import (
     model_validator,
 )
 
-from dem.arrays import Array, Numbers
+from dem.arrays import Array, Numbers, plain
 from dem.body.kinds import Kind, Mixture, bodies_of
 from dem.body.particle import Particle, SphereChain, chain_mean_width, mean_width
 from dem.engine.demand import Activity
@@ -28,6 +27,7 @@ from dem.phases.deposit import Deposit
 from dem.phases.kinds import AnyPhase
 from dem.phases.pull_hook import with_pull_defaults
 from dem.phases.take_over import TakeOver
+from dem.scene.keys import put
 from dem.scene.rules import problems
 from dem.scene.stiffness import stiffness_for
 from dem.setting.contact import Contact, with_preset
@@ -47,6 +47,10 @@ from dem.strict import explained
 # Distance of neighbouring spheres, in diameters, of the chains that represent smooth links in pours and pictures. Where
 # such chains do not overlap, the links themselves overlap by a thirtieth of a diameter at most.
 SMOOTH_PITCH = 0.35
+SCHEMA_VERSION: Literal[2] = (
+    2  #: Version of the format of scenes; version 1, which is read too, has another default engine
+)
+ENGINE_OF_VERSION_1 = "yade"
 P = TypeVar("P", bound=Part)
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
 
@@ -67,12 +71,12 @@ def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping
 class Scene(Part):
     """Description of one run: everything that its result depends on."""
 
-    model_config = ConfigDict(serialize_by_alias=True)
-
-    schema_version: Literal[1] = Field(1, description="version of this format [1]")
-    engine: Literal["yade", "links", "lammps"] = Field(
-        "yade",
-        description="engine: yade, chains of spheres on YADE; links, swept segments; or lammps, chains of spheres on "
+    schema_version: Literal[1, 2] = Field(
+        SCHEMA_VERSION, description="version of this format [1]; in version 1 the default of engine is yade"
+    )
+    engine: Literal["links", "yade", "lammps"] = Field(
+        "links",
+        description="engine: links, swept segments; yade, chains of spheres on YADE; or lammps, chains of spheres on "
         "LAMMPS, on several processes and nodes, for passive scenes",
     )
     protocol: Protocol | None = Field(
@@ -82,9 +86,8 @@ class Scene(Part):
     )
     name: str = Field("scene", min_length=1, max_length=100, description="name for titles and tables")
     seed: int = Field(..., ge=0, lt=2**63, description="the only source of randomness [1]")
-    shapes: tuple[AnyShape, ...] | None = Field(
+    particle: tuple[AnyShape, ...] | None = Field(
         None,
-        alias="particle",
         min_length=1,
         max_length=16,
         description="shape of the bodies, or a list of shapes for a mixture; default: smarticle, described by the key "
@@ -110,6 +113,7 @@ class Scene(Part):
 
     def __init__(self, **keys: Any) -> None:
         """Make a scene from its keys; raise InputError in one line if they are not valid."""
+        keys = plain(keys)
         try:
             super().__init__(**keys)
         except ValidationError as error:
@@ -117,6 +121,60 @@ class Scene(Part):
 
     # Tells pydantic that files are validated without this method, which would lose the folder of relative paths.
     __init__.__pydantic_base_init__ = True  # type: ignore[attr-defined]
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether all keys are equal; pydantic would compare cached properties, too, with their arrays."""
+        return isinstance(other, Scene) and self._values == other._values
+
+    def __hash__(self) -> int:
+        return hash(self._values)
+
+    @property
+    def _values(self) -> tuple[Any, ...]:
+        return tuple(getattr(self, name) for name in type(self).model_fields)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Raise InputError: a scene is not changed after it was checked."""
+        raise InputError(f"{name}: a scene cannot be changed; make another one, by scene.replace({name}=…)")
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a scene with other values of some keys; raise InputError if it is not valid.
+
+        Keys of parts have dots: `scene.replace(count=40, **{"smarticle.aspect_ratio": 0.4})`. Values that follow from
+        other keys follow anew.
+        """
+        data = self.given
+        for key, value in plain(changes).items():
+            put(data, key, value)
+        return type(self)(**data)
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return a copy; with `update`, the scene of `replace`, which is checked."""
+        return self.replace(**update) if update else super().model_copy(deep=deep)
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """The keys that were set, with their values, as nested mappings.
+
+        Keys of `fidelity` are left out if their values follow from the rest of the scene.
+        """
+        data = self.model_dump(mode="json", exclude_unset=True)
+        if "fidelity" in data:
+            derived = dict(self.named_knobs)
+            if self.smooth:
+                derived["stiffness_N_per_m"] = max(derived["stiffness_N_per_m"], stiffness_for(self))
+            differing = {key: value for key, value in data["fidelity"].items() if derived.get(key) != value}
+            data["fidelity"] = {**differing, "base": self.fidelity.base}
+        return data
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_this_version(cls, data: Any) -> Any:
+        """Return the data of a scene of version 1 as data of `SCHEMA_VERSION`."""
+        version = data.get("schema_version") if isinstance(data, Mapping) else None
+        if version == 1 and not isinstance(version, bool):
+            return {"engine": ENGINE_OF_VERSION_1, **data, "schema_version": SCHEMA_VERSION}
+        return data
 
     @model_validator(mode="before")
     @classmethod
@@ -152,10 +210,17 @@ class Scene(Part):
             raise ValueError(f"{value:g} m/s² is out of range; use 0 m/s² or at least {_LEAST_GRAVITY:g} m/s²")
         return value
 
-    @field_validator("shapes", mode="before")
+    @field_validator("particle", mode="before")
     @classmethod
     def _one_or_many(cls, value: Any) -> Any:
         return listed(value)
+
+    @field_validator("particle")
+    @classmethod
+    def _of_some_body(cls, value: tuple[AnyShape, ...] | None) -> tuple[AnyShape, ...] | None:
+        if value is not None and all(shape.absent for shape in value):
+            raise ValueError("all shares are 0, so that no body has a shape; give one of them a share above 0")
+        return value
 
     @field_validator("hooks", mode="before")
     @classmethod
@@ -198,7 +263,7 @@ class Scene(Part):
     def _filled_by_size(self) -> Self:
         """Scale defaults that are those of the paper's smarticle at 9.81 m/s²; see their descriptions."""
         gravity, paper = self.gravity_m_per_s2 or EARTH_GRAVITY, Smarticle()
-        if self.shapes is None:
+        if self.particle is None:
             ratio = _usual_torque(self.smarticle, gravity) / _usual_torque(paper, EARTH_GRAVITY)
             vars(self)["motor"] = _scaled(self.motor, "stiffness_N_m_per_rad", ratio)
         root = math.sqrt(gravity * _sizes(dict(self))[0] / (EARTH_GRAVITY * paper.middle_length_m))
@@ -361,9 +426,10 @@ class Scene(Part):
         return frozenset(self.activity(index) for index, duration in enumerate(durations) if duration > 0)
 
     @cached_property
-    def particle(self) -> Particle:
+    def body(self) -> Particle:
         """One smarticle, with the spheres that represent it."""
-        assert self.shapes is None  # other bodies are in `mixture`
+        if self.particle is not None:
+            raise InputError("body: a scene with the key particle has no smarticles; its bodies are in scene.bodies")
         diameter = self.sphere_diameter
         chain = SphereChain(rows=self.fidelity.rows, diameter=diameter, pitch=self._pitch * diameter)
         return Particle(self.smarticle.boxes, chain)
@@ -375,12 +441,15 @@ class Scene(Part):
     @cached_property
     def mixture(self) -> Mixture | None:
         """Kinds of bodies and the kind of each body, from the key `particle`; None for smarticles."""
-        if self.shapes is None:
+        if self.particle is None:
             return None
         rng = np.random.default_rng(self.seed_for("shapes"))
         kinds: list[Kind] = []
         of: list[Numbers] = []
-        for shape, number in zip(self.shapes, numbers_of_shapes(self.shapes, self.count), strict=True):
+        shapes, numbers = self.particle, numbers_of_shapes(self.particle, self.count)
+        for shape, number in zip(shapes, numbers, strict=True):
+            if shape.absent:
+                continue
             of.append(len(kinds) + rng.integers(len(shape.factors), size=number))
             kinds += [self._kind(shape, float(factor)) for factor in shape.factors]
         order = np.concatenate(of)
@@ -411,7 +480,7 @@ class Scene(Part):
     @property
     def model(self) -> Particle | Mixture:
         """The bodies as engines compute them: one smarticle, or a mixture."""
-        return self.mixture or self.particle
+        return self.mixture or self.body
 
     @property
     def bodies(self) -> tuple[Particle | Kind, ...]:
@@ -446,8 +515,8 @@ def _sizes(given: Mapping[str, Any]) -> tuple[float, float]:
 
     `given` are parts of the scene that are validated already, by their names in the model.
     """
-    if given.get("shapes"):
-        bars = [shape.bars() for shape in given["shapes"]]
+    if given.get("particle"):
+        bars = [shape.bars() for shape in given["particle"] if not shape.absent]
         return max(float(each.lengths.max()) for each in bars), min(each.thickness_in_plane for each in bars)
     smarticle = given.get("smarticle") or Smarticle()
     return smarticle.middle_length_m, smarticle.thickness_in_plane_m

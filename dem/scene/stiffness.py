@@ -41,7 +41,7 @@ def expected_overlaps(scene: SceneView) -> tuple[Overlap, ...]:
     width, thickness = model.size, min(mean_width(*body.thicknesses) for body in scene.bodies)
     speeds = [phase.peak_speed(gravity) for phase in scene.phases]
     if scene.actuates and scene.mixture is None:
-        speeds.append(scene.motor.speed_limit_rad_per_s * scene.particle.boxes.barb_length)
+        speeds.append(scene.motor.speed_limit_rad_per_s * scene.body.boxes.barb_length)
     slabs = [phase.layer_height_w for phase in scene.phases if isinstance(phase, Deposit) and phase.every_s is None]
     speed = math.sqrt(max(speeds) ** 2 + 2 * gravity * width * max([1.0, *slabs]))
     mass = max(map(typical_effective_mass, scene.bodies))

@@ -15,6 +15,7 @@ from dem.body.linkage import Linkage, layout_of, link_of
 from dem.errors import InputError, nearest, shown
 from dem.setting.joints import AnyJoint
 from dem.setting.part import LONGEST_LENGTH, Density, Length, Part, Stiffness, as_list
+from dem.strict import in_radians
 
 SIZES = 16  # equally frequent lengths that stand in for a spread of lengths
 NORMAL, IN_PLANE = 1.27e-3, 0.5e-3  # m, the section of the paper's smarticles
@@ -50,9 +51,12 @@ class Shaped(Part):
     diameter_m: Length | None = Field(None, description="diameter of a round section [m]; default: a flat section")
     density_kg_per_m3: Density = Field(7850.0, description="density [kg/m³]; mass and inertia are those of the bars")
     share: float | None = Field(
-        None, gt=0, le=1e6, description="part of all bodies that have this shape, relative to other shapes [1]"
+        None,
+        ge=0,
+        le=1e6,
+        description="part of all bodies that have this shape, relative to other shapes [1]; 0: none has it",
     )
-    count: int | None = Field(None, ge=1, le=100_000, description="bodies of this shape, instead of a share [1]")
+    count: int | None = Field(None, ge=0, le=100_000, description="bodies of this shape, instead of a share [1]")
     spread: float = Field(
         0.0,
         ge=0,
@@ -71,8 +75,14 @@ class Shaped(Part):
             for factor in self.factors[[0, -1]]:
                 _ = self.bars(float(factor))
         except InputError as error:
-            raise ValueError(f"shape: {self.tag()}: {error}") from None
+            smallest = min(np.ravel(getattr(self, "angle_deg", 0.0)), key=abs)
+            raise ValueError(f"shape: {self.tag()}: {error}{in_radians(smallest)}") from None
         return self
+
+    @property
+    def absent(self) -> bool:
+        """Whether the scene says that no body has this shape."""
+        return self.share == 0 or self.count == 0
 
     @property
     def factors(self) -> Array:

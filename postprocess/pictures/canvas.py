@@ -71,7 +71,7 @@ class Style:
             raise InputError("a run in a plane and one in space have no view in common; compare runs of one kind")
         name = view or ("top" if runs[0].manifest.planar else "front")
         if name not in VIEWS:
-            raise InputError(f"view {name!r}: is not known; {nearest(name, VIEWS)}")
+            raise InputError(f"view: {name!r} is not known; {nearest(name, VIEWS)}")
         if not all(_LEAST_SIZE <= side <= _LARGEST_SIZE for side in size):
             msg = f"size must be {_LEAST_SIZE} to {_LARGEST_SIZE} pixels each way: got {size[0]} x {size[1]}"
             raise InputError(msg)

@@ -1,16 +1,25 @@
 """Command `export`: write a run for other programs and archives, or a scene for LAMMPS."""
 
 import argparse
-import sys
+from functools import partial
 from pathlib import Path
 
-from dem.errors import InputError
-from dem.terminal import redraw
+from dem.display import progress_of
+from dem.errors import InputError, nearest
 from smarticles.command_line import Commands, add_options, names
 
 _FORMATS = ("vtp", "gsd", "stl", "obj", "gltf", "glb")
 _LAMMPS = "lammps"
 _CRATE = "ro-crate"
+_KNOWN = (*_FORMATS, _LAMMPS, _CRATE)
+_INSTEAD = {
+    **dict.fromkeys(("xyz", "extxyz", "dump", "lammpstrj", "pdb", "dcd"), "gsd, a trajectory that OVITO reads"),
+    **dict.fromkeys(("vtk", "vtu", "vtkhdf", "pvd"), "vtp, for ParaView"),
+    **dict.fromkeys(("ply", "off", "dae", "fbx", "blend"), "glb or obj, for Blender"),
+    "3mf": "stl, for 3D printers",
+    "csv": "`smarticles measure DIR --frames --table FILE.csv` for measures, or gsd for positions",
+}
+"""Formats that there are in place of others."""
 
 # Kept here because `postprocess.export`, which has this table too, is slow to import; a test compares both.
 _FIELDS = """\
@@ -80,7 +89,7 @@ Fields of each box:
 """,
     )
     add_options(export, "directory", help="run directory; for lammps a scene file")
-    export.add_argument("--to", required=True, metavar="FORMAT", help=", ".join((*_FORMATS, _LAMMPS, _CRATE)))
+    export.add_argument("--to", required=True, metavar="FORMAT", help=", ".join(_KNOWN))
     default = "default: DIR/export.FORMAT or DIR/export-FORMAT; for lammps SCENE-lammps next to the scene"
     add_options(export, "--output", metavar="PATH", help=default)
     add_options(export, "--time")
@@ -141,22 +150,23 @@ def export_run(arguments: argparse.Namespace) -> int:
         return _export_scene(arguments)
     if arguments.to == _CRATE:
         return _export_crate(arguments)
+    if arguments.to not in _KNOWN:
+        instead = _INSTEAD.get(arguments.to.lower().removeprefix("."))
+        advice = f"use {instead}" if instead else nearest(arguments.to, _KNOWN)
+        raise InputError(f"--to {arguments.to}: no such format; {advice}")
     from postprocess import export  # noqa: PLC0415  (imports PyVista)
 
-    def show_progress(done: int, count: int) -> None:
-        if sys.stderr.isatty() and count > 1:
-            redraw(f"frame {done} of {count}", last=done == count)
-
-    written = export.export_run(
-        arguments.directory,
-        to=arguments.to,
-        output=arguments.output,
-        time=arguments.time,
-        every_frame=arguments.all,
-        wanted=arguments.wanted,
-        unwanted=arguments.unwanted,
-        color_by=arguments.color_by,
-        progress=show_progress,
-    )
+    with progress_of("exporting") as progress:
+        written = export.export_run(
+            arguments.directory,
+            to=arguments.to,
+            output=arguments.output,
+            time=arguments.time,
+            every_frame=arguments.all,
+            wanted=arguments.wanted,
+            unwanted=arguments.unwanted,
+            color_by=arguments.color_by,
+            progress=partial(progress, "frames exported"),
+        )
     print(written)
     return 0

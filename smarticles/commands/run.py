@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dem.display import Display, Row
 from dem.errors import InputError
 from dem.record.names import MANIFEST, SCENE
 from dem.run.stop import StopRequest, StopRequestedError, release
@@ -123,12 +124,7 @@ def read_scene(scene_file: Path, settings: Sequence[str]) -> Scene:
     from dem.plan.steps import time_steps  # noqa: PLC0415
     from dem.scene.reading import load_scene  # noqa: PLC0415
 
-    scene = load_scene(scene_file, settings)
-    try:
-        time_steps(scene)
-    except InputError as error:
-        raise InputError(f"{scene_file}: {error}") from None
-    return scene
+    return load_scene(scene_file, settings, check=time_steps)
 
 
 def _run(
@@ -150,13 +146,15 @@ def _run_until(
 ) -> int:
     scene = read_scene(scene_file, settings)
     _set_parallelism(scene, out, resume=resume, threads=arguments.threads, ranks=arguments.ranks)
-    # Imported last: both import YADE, which takes seconds and needs the variables set above.
-    from dem.run import run  # noqa: PLC0415
-
     quoted_out = shlex.quote(str(out))
     command = getattr(arguments, "recorded_as", None) or arguments.command_line
     try:
-        outcome = run.run_scene(scene, out, command=command, progress=sys.stderr.isatty(), resume=resume, stop=stop)
+        with Display() as display:
+            display.update(Row(label="starting"))
+            # Imported last: it imports YADE, which takes seconds and needs the variables set above.
+            from dem.run import run  # noqa: PLC0415
+
+            outcome = run.run_scene(scene, out, command=command, display=display, resume=resume, stop=stop)
     except StopRequestedError as stopped:
         print(f"smarticles: {stopped}; to be continued: smarticles resume {quoted_out}", file=sys.stderr)
         return TO_BE_CONTINUED

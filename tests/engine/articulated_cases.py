@@ -160,7 +160,7 @@ def resting_pile(data: dict[str, Any], *, count: int, settle: float, change: str
     engine = build(scene, radius=scene.container.radius_m)
     rng = np.random.default_rng(scene.seed)
     layer = {"count": count, "radius": scene.container.radius_m, "bottom": 1e-4, "height": 1e-2, "rng": rng}
-    engine.add(place_layer(scene.particle, obstacles=np.empty((0, 3)), **layer))
+    engine.add(place_layer(scene.body, obstacles=np.empty((0, 3)), **layer))
     engine.advance(round(settle / engine.time_step))
     split_first = change in ("split-rest", "weld")
     if split_first:

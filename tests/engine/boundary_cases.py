@@ -44,7 +44,7 @@ def hang(data: dict[str, Any], *, settle: float, pull: float) -> dict[str, Any]:
     scene = scene_of(data)
     engine = build(scene)
     cross = scene.hooks.crosses[1]
-    particle = scene.particle
+    particle = scene.body
     middle = HANGING.apply(particle.centres[particle.links == 1])
     top = cross.height + cross.side / 2 + particle.radius
     # Off the axis, clear of the other bar, its middle link across this one.

@@ -40,7 +40,7 @@ def build(
 ) -> YadeEngine:
     """An engine of a scene, welded and at rest, or of what `instead` says."""
     made = {
-        "particle": scene.particle,
+        "particle": scene.body,
         "cylinder": Cylinder(radius=radius or scene.container.radius_m, height=scene.cylinder.height, facets=facets),
         "law": contact_law_of(scene),
         "gravity": scene.gravity_m_per_s2,
@@ -91,7 +91,7 @@ def poses(data: dict[str, Any], *, count: int, seed: int, steps: int) -> dict[st
         "tensors": np.array([axes_of(clump) @ np.diag(vec(clump.inertia)) @ axes_of(clump).T for clump in clumps]),
         "masses": np.array([clump.mass for clump in clumps]),
         "spheres": np.array(spheres).reshape(count, -1, 3),
-        "expected_spheres": state.spheres(scene.particle),
+        "expected_spheres": state.spheres(scene.body),
     }
 
 
@@ -100,7 +100,7 @@ def pour(
 ) -> None:
     """A layer just above the floor, clear of the centres of spheres (n, 3) that exist already."""
     poses = place_layer(
-        scene.particle,
+        scene.body,
         count=count,
         radius=scene.container.radius_m if radius is None else radius,
         bottom=1e-4,
@@ -163,7 +163,7 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
 def run(data: dict[str, Any], out: str) -> dict[str, Any]:
     """A whole run; errors come back as text."""
     try:
-        run_scene(scene_of(data), Path(out), command="test", progress=False)
+        run_scene(scene_of(data), Path(out), command="test")
     except (InputError, RunError) as error:
         return {"error": type(error).__name__, "text": str(error)}
     return {"error": None, "text": ""}
@@ -208,7 +208,7 @@ def thrown(data: dict[str, Any], *, count: int, speed: float, steps: int, every:
     engine = build_engine(scene, time_step(scene))
     rng = np.random.default_rng(scene.seed)
     poses = place_layer(
-        scene.particle, count=count, radius=0.012, bottom=3e-3, height=5e-3, obstacles=np.empty((0, 3)), rng=rng
+        scene.body, count=count, radius=0.012, bottom=3e-3, height=5e-3, obstacles=np.empty((0, 3)), rng=rng
     )
     engine.add(poses, speed=speed)
     vertices, touches = [np.array(engine.state().vertices)], []

@@ -18,7 +18,7 @@ def single(data: dict[str, Any], rotation: Rotation) -> tuple[Scene, YadeEngine]
     """One smarticle alone in the plane, its motors holding; its barb tips lie on the x-axis unless it is turned."""
     scene = scene_of(data)
     engine = build_engine(scene, time_step(scene))
-    add(engine, (0, -scene.particle.boxes.vertices[0, 1], 0), rotation)
+    add(engine, (0, -scene.body.boxes.vertices[0, 1], 0), rotation)
     engine.motors.articulate()
     return scene, engine
 
@@ -34,7 +34,7 @@ def hold(engine: YadeEngine, scene: Scene, seconds: float) -> None:
 def pulled_apart(data: dict[str, Any], *, speed: float, moments: list[float]) -> list[dict[str, float]]:
     """Both barb tips of one smarticle pulled apart by strings; torque by geometry and angle at some moments [s]."""
     scene, engine = single(data, Rotation.identity())
-    half = scene.particle.boxes.barb_length / 2
+    half = scene.body.boxes.barb_length / 2
     law = StringLaw(length=0.1, stiffness=5000.0, damping=1.0)
     engine.strings.tie([Tie(0, 0, half), Tie(0, 2, half)], law, (speed, speed))
     found, now = [], 0.0

@@ -32,7 +32,7 @@ def build() -> Iterator[Callable[..., LammpsEngine]]:
 
     def make(scene: Scene, *, ranks: int = 2, **instead: Any) -> LammpsEngine:
         made = {
-            "particle": scene.particle,
+            "particle": scene.body,
             "cylinder": Cylinder(radius=scene.container.radius_m, height=scene.cylinder.height, facets=64),
             "law": contact_law_of(scene),
             "gravity": scene.gravity_m_per_s2,

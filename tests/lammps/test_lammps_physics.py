@@ -131,7 +131,7 @@ def test_the_floor_gives_back_what_its_law_says_and_never_pulls(build: Build) ->
     put(engine, (0, 0, scene.smarticle.middle_length_m / 2 + 1e-5), turns=(UPRIGHT,), speed=speed)
     forces = stepped(engine, 800)[:, 0, 2]
     exact = dashpot_impact(
-        stiffness=law.normal_stiffness, damping=law.wall_damping, mass=scene.particle.boxes.mass
+        stiffness=law.normal_stiffness, damping=law.wall_damping, mass=scene.body.boxes.mass
     ).restitution
     assert forces.max() > 0 == forces[-1]
     assert forces.min() > -1e-9 * forces.max()
@@ -144,7 +144,7 @@ def test_two_that_meet_part_as_their_law_says_and_never_pull(build: Build) -> No
     put(engine, (0, 0, 0.02), turns=(UPRIGHT,))
     put(engine, (0, 0, 0.02 + scene.smarticle.middle_length_m + 1e-5), turns=(UPRIGHT,), speed=speed)
     forces = stepped(engine, 800)[:, :, 2]
-    mass = scene.particle.boxes.mass
+    mass = scene.body.boxes.mass
     exact = dashpot_impact(stiffness=law.normal_stiffness, damping=law.normal_damping, mass=mass / 2).restitution
     after = engine.state().velocities[:, 2]
     assert forces[:, 1].max() > 0 == forces[-1, 1]

@@ -44,7 +44,7 @@ def flat(folder: Path, height: float) -> Path:
     boxes = parse_scene({"schema_version": 1, "seed": 1, "count": 1, "phases": [{"type": "deposit"}]}, source="x")
     still = np.zeros((1, 3))
     place = np.array([[0.0, 0.0, height]])
-    state = State.rigid(boxes.particle.boxes, place, np.eye(3)[None], still, still)
+    state = State.rigid(boxes.body.boxes, place, np.eye(3)[None], still, still)
     FrameWriter(folder).write(mesh_of(state.vertices, phase=1), 0.0)
     write_ending(folder, run.phases, [(0, 1), (1, 2)], status="done", wall=1.0)
     return folder

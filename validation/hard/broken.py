@@ -45,7 +45,7 @@ def spoil(access: EngineAccess, out: Path, *, what: str, articulated: bool, step
     scene, engine, recorder = watched(scene_data(access, shape_change(), count=3), out)
     # A few diameters apart, so that no smarticle falls on another.
     for k in range(3):
-        add(engine, (0, 0, lying(scene) + 1e-5 + 3 * k * scene.particle.radius))
+        add(engine, (0, 0, lying(scene) + 1e-5 + 3 * k * scene.body.radius))
     engine.advance(10)
     if articulated:
         engine.motors.articulate()

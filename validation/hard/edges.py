@@ -196,7 +196,7 @@ def _jammed(run: Watched) -> list[Check]:
 def no_room(access: EngineAccess, out: Path, *, count: int, seconds: float) -> list[Check]:
     """Straighten smarticles (l/w = 0.7) in a container of 1.05 times the smallest allowed radius."""
     data = scene_data(access, shape_change(seconds, hold=0.05), RELAX, count=count, per_layer=1)
-    reach, message = scene_of(data).particle.reach, None
+    reach, message = scene_of(data).body.reach, None
     try:
         scene_of({**data, "container": {"radius_m": 0.999 * reach}})
     except InputError as error:
@@ -250,7 +250,7 @@ def hook(
 def oscillation(access: EngineAccess, out: Path, *, seconds: float, count: int = 3) -> list[Check]:
     """Swing the barbs of smarticles on the floor by 5° at 8 Hz."""
     scene, engine, recorder = watched(scene_data(access, shape_change(), count=count), out)
-    particle, boxes = scene.particle, scene.smarticle.boxes
+    particle, boxes = scene.body, scene.smarticle.boxes
     for k in range(count):
         height = 3 * particle.reach * (k + 0.5) / 2 + lying(scene)
         add(engine, (0, 0, height), Rotation.from_euler("zx", [1.1 * k, 0.2 * k]))

@@ -60,7 +60,7 @@ class Setting:
         smarticle = {"aspect_ratio": self.ratio}
         data = scene_data(access, *phases, count=self.count, fidelity=self.fidelity, smarticle=smarticle)
         if self.keys == "at the wall":
-            data["container"] = {"radius_m": 1.05 * scene_of(data).particle.reach}
+            data["container"] = {"radius_m": 1.05 * scene_of(data).body.reach}
         if self.keys == "on hooks":
             data["hooks"] = {}
         return data
@@ -85,7 +85,7 @@ SETTINGS: Mapping[str, Setting] = {
 
 def poses(setting: Setting, scene: Scene, seed: int) -> Poses:
     """Return the initial poses of all smarticles of a setting; the seed varies them."""
-    rng, particle = np.random.default_rng(seed), scene.particle
+    rng, particle = np.random.default_rng(seed), scene.body
     if setting.placed == "pile":
         narrow, reach = setting.keys == "at the wall", particle.reach
         layers = setting.count if narrow else 1

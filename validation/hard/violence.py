@@ -51,7 +51,7 @@ def drop(access: EngineAccess, out: Path, *, articulated: bool, time: float) -> 
         energies.append(energy(engine))
         lows.append(engine.state().smarticles.positions[0, 2])
         gaps.append(engine.motors.gaps().max())
-    d, particle = scene.sphere_diameter, scene.particle
+    d, particle = scene.sphere_diameter, scene.body
     most, end = (max(energies) - max(0.0, engine.motors.work)) / energies[0], energies[-1] / energies[0]
     # Depth at which a single spring holds the whole kinetic energy.
     depth = speed * math.sqrt(particle.boxes.mass / scene.fidelity.stiffness_N_per_m)
@@ -107,7 +107,7 @@ def tip(access: EngineAccess, out: Path, *, speed: float) -> list[Check]:
     message, first, lowest = None, energy(engine), math.inf
     while not message and engine.time < 0.05:
         engine.advance(2)
-        lowest = min(lowest, float(engine.state().smarticles.spheres(scene.particle)[..., 2].min()))
+        lowest = min(lowest, float(engine.state().smarticles.spheres(scene.body)[..., 2].min()))
         message = watchdog_error(engine, recorder)
     left = "1 smarticle(s) (0): left through the wall or the floor; raise fidelity.stiffness_N_per_m"
     return [
@@ -129,7 +129,7 @@ def overlap(access: EngineAccess, out: Path, *, time: float) -> list[Check]:
     for _ in range(round(time / 1e-3)):
         engine.advance(round(1e-3 / engine.time_step))
         energies.append(energy(engine))
-    spheres = engine.state().smarticles.spheres(scene.particle)
+    spheres = engine.state().smarticles.spheres(scene.body)
     apart = np.linalg.norm(spheres[0][:, None] - spheres[1][None], axis=-1).min()
     # On links the barrier separates them; chains of spheres may pass through each other, which must be reported.
     seen = (
@@ -219,7 +219,7 @@ def mass_ratio(
     carries = stiffness > 250 * ratio / 10
     data = scene_data(access, count=2, fidelity={"base": "draft", "stiffness_N_per_m": stiffness})
     scene, engine, recorder = watched(data, out)
-    flat, d, centres = lying(scene), scene.sphere_diameter, access.ends(scene.particle)
+    flat, d, centres = lying(scene), scene.sphere_diameter, access.ends(scene.body)
     # The centre of mass is not in the middle of the contact springs, so that the smarticle also tilts.
     middle = centres[:, 1].mean()
     softness = (1 / len(centres) + middle**2 / ((centres[:, 1] - middle) ** 2).sum()) / stiffness
@@ -292,7 +292,7 @@ def lid(access: EngineAccess, out: Path, *, count: int, stiffness: float) -> lis
         return message
 
     resting = watch(rise + 0.4)
-    load = (count + ratio - 1) * scene.particle.boxes.mass * scene.gravity_m_per_s2
+    load = (count + ratio - 1) * scene.body.boxes.mass * scene.gravity_m_per_s2
     # Each step kicks the loaded smarticle itself by `ratio` g dt.
     speeds = np.delete(np.linalg.norm(engine.state().smarticles.link_velocities, axis=-1), top, axis=0)
     force = -access.floor_force(engine)[2]

@@ -87,14 +87,14 @@ def ball_rolls(access: EngineAccess) -> list[Answer]:
 @case("sliding to rolling, bar", "a bar of spheres thrown across itself, with its box's inertia", "v₀/(1 + I/mr²)")
 def bar_rolls(access: EngineAccess) -> list[Answer]:
     one = scene(access, fidelity=ONE_STRAND, smarticle={"aspect_ratio": 0})
-    return roll(access, one.particle, law_of(one), speed=0.3, dt=time_step(one) / 4)
+    return roll(access, one.body, law_of(one), speed=0.3, dt=time_step(one) / 4)
 
 
 @case("sliding to a stop", "a U lying flat is pushed along its axis of symmetry", "Coulomb: μg, v²/2μg")
 def slide(access: EngineAccess, *, aspect_ratio: float = 0.7, friction: float = 0.4) -> list[Answer]:
     speed = 0.3
     one = scene(access, smarticle={"aspect_ratio": aspect_ratio}, contact={"friction_wall": friction})
-    engine = resting(access, one.particle, law_of(one), dt=time_step(one), speed=speed)
+    engine = resting(access, one.body, law_of(one), dt=time_step(one), speed=speed)
     stops, way = speed / (friction * G), speed**2 / (2 * friction * G)
     rows = [(0.0, -0.03, speed)]
     while engine.time < 1.5 * stops:
@@ -252,9 +252,9 @@ def _answers(engine: Engine, levels: int, each: int, *, contacts: int | None) ->
 )
 def crossed_bars(access: EngineAccess, *, levels: int = 5) -> list[Answer]:
     one = scene(access, fidelity=ONE_STRAND, smarticle={"aspect_ratio": 0})
-    engine = access.build(one.particle, law_of(one), dt=time_step(one), gravity=G)
-    radius = one.particle.radius
-    apart = 2 * radius * round(one.particle.boxes.middle_length / 6 / radius)
+    engine = access.build(one.body, law_of(one), dt=time_step(one), gravity=G)
+    radius = one.body.radius
+    apart = 2 * radius * round(one.body.boxes.middle_length / 6 / radius)
     for level in range(levels):
         turn = Rotation.from_euler("z", 90 * (level % 2), degrees=True)
         for side in (-1, 1):
@@ -270,7 +270,7 @@ def crossed_bars(access: EngineAccess, *, levels: int = 5) -> list[Answer]:
 )
 def flat_smarticles(access: EngineAccess, *, levels: int = 4) -> list[Answer]:
     one = scene(access, fidelity=ONE_STRAND)
-    engine = access.build(one.particle, law_of(one), dt=time_step(one), gravity=G)
+    engine = access.build(one.body, law_of(one), dt=time_step(one), gravity=G)
     for level in range(levels):
         add(engine, (0.0, 0.0, (2 * level + 1) * lying(one)))
     engine.advance(round(SETTLED / engine.time_step))
@@ -291,7 +291,7 @@ STRANDS = ((1, 0.0), (2, 0.0))  # on links, which have no pitch
 
 def _thrown(access: EngineAccess, one: Scene, dt: float) -> tuple[float, float]:
     """Throw a smarticle flat at the floor; return its restitution [1] and contact time [s]."""
-    engine = access.build(one.particle, law_of(one), dt=dt)
+    engine = access.build(one.body, law_of(one), dt=dt)
     add(engine, (0, 0, lying(one) + 3.3 * THROWN * dt))
     access.push(engine, 0, velocity=(0, 0, -THROWN))
     first = last = 0
@@ -305,7 +305,7 @@ def _thrown(access: EngineAccess, one: Scene, dt: float) -> tuple[float, float]:
 
 def _sunk(access: EngineAccess, one: Scene, dt: float, *, time: float) -> float:
     """Simulate a smarticle lying flat for a `time` [s]; return how far its centre of mass sinks [m]."""
-    engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
+    engine = access.build(one.body, law_of(one), dt=dt, gravity=G)
     add(engine, (0, 0, lying(one)))
     engine.advance(round(time / dt))
     return lying(one) - float(engine.state().smarticles.positions[0, 2])
@@ -325,7 +325,7 @@ def flat_impact(access: EngineAccess, *, rows: int, pitch: float, restitution: f
     """
     fidelity = {"base": "standard", "rows": rows} | ({"pitch": pitch} if pitch else {})
     one = scene(access, fidelity=fidelity, contact={"restitution": restitution})
-    law, boxes, points = law_of(one), one.smarticle.boxes, lowest(access, one.particle)
+    law, boxes, points = law_of(one), one.smarticle.boxes, lowest(access, one.body)
     stiffness, damping, mass, count = law.normal_stiffness, law.wall_damping, boxes.mass, len(points)
     springs = {"stiffness": stiffness, "damping": damping, "mass": mass}
     after, lasts = falling_on_springs(points, **springs, inertia=boxes.inertia[:2], speed=THROWN)
@@ -335,7 +335,7 @@ def flat_impact(access: EngineAccess, *, rows: int, pitch: float, restitution: f
     return {
         "rows": rows,
         "pitch": pitch,  # over the sphere diameter; 0 on links
-        "spheres": len(one.particle.centres),
+        "spheres": len(one.body.centres),
         "contacts": count,  # spheres that touch the floor
         "nominal": restitution,  # `contact.restitution` of the scene [1]
         # Restitution of parallel springs and dashpots without tilt [1]. With tilt, the restitution is the root of the
@@ -347,7 +347,7 @@ def flat_impact(access: EngineAccess, *, rows: int, pitch: float, restitution: f
         "theory_contact": lasts,  # from first touch to the end of the last contact [s]
         "measured_contact": contact,
         # Duration of an elastic contact of one sphere at the typical effective mass [s].
-        "single_contact": math.pi * math.sqrt(typical_effective_mass(one.particle) / stiffness),
+        "single_contact": math.pi * math.sqrt(typical_effective_mass(one.body) / stiffness),
         # Static sinkage of the centre of mass under its own weight [m], after the vibration has decayed.
         "theory_sunk": _sunk_theory(points, stiffness=stiffness, weight=mass * G),
         "measured_sunk": _sunk(access, one, period / 60, time=40 * period),

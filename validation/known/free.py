@@ -30,7 +30,7 @@ def fall(access: EngineAccess, dt: float, *, time: float, throw: float, centred:
     the end [m/s], and the angle of rotation [rad].
     """
     one = scene(access)
-    engine = access.build(one.particle, law_of(one), dt=dt, gravity=G)
+    engine = access.build(one.body, law_of(one), dt=dt, gravity=G)
     add(engine, (0, 0, 0.1), TILTED)
     access.push(engine, 0, velocity=(0, 0, throw + centred * G * dt / 2))
     engine.advance(round(time / dt))
@@ -71,7 +71,7 @@ def spin_rotations(access: EngineAccess, dt: float, *, spin: Array, times: Array
     Returns the rotations at n times [s], and the mean angular velocities in the step before each, (n, 3) [rad/s].
     """
     one = scene(access)
-    engine = access.build(one.particle, law_of(one), dt=dt)
+    engine = access.build(one.body, law_of(one), dt=dt)
     add(engine, (0, 0, 0.1), TILTED)
     access.push(engine, 0, spin=spin)
     rows, spins = [], []

@@ -140,9 +140,9 @@ def bar_rebound(access: EngineAccess, restitution: float = 0.5, *, resized: bool
     one = scene(access, smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
     law, mass, speed, length = law_of(one), one.smarticle.boxes.mass, 0.5, one.smarticle.middle_length_m
     if resized:
-        scale = math.sqrt(mass / typical_effective_mass(one.particle))
+        scale = math.sqrt(mass / typical_effective_mass(one.body))
         law = dataclasses.replace(law, wall_damping=law.wall_damping * scale)
-    engine = access.build(one.particle, law, dt=time_step(one) / 8)
+    engine = access.build(one.body, law, dt=time_step(one) / 8)
     add(engine, (0, 0, length / 2 + 1e-5), UPRIGHT)
     access.push(engine, 0, velocity=(0, 0, -speed))
     found = touch(access, engine, most=10 * RESOLVED)
@@ -163,7 +163,7 @@ def bar_rebound(access: EngineAccess, restitution: float = 0.5, *, resized: bool
 def bars_rebound(access: EngineAccess, restitution: float = 0.5) -> list[Answer]:
     one = scene(access, smarticle={"aspect_ratio": 0}, contact={"restitution": restitution})
     law, mass, speed = law_of(one), one.smarticle.boxes.mass, 0.5
-    engine = access.build(one.particle, law, dt=time_step(one) / 8)
+    engine = access.build(one.body, law, dt=time_step(one) / 8)
     add(engine, (0, 0, 0.05), UPRIGHT)
     add(engine, (0, 0, 0.05 + one.smarticle.middle_length_m + 1e-4), UPRIGHT)
     access.push(engine, 0, velocity=(0, 0, speed / 2))
@@ -184,7 +184,7 @@ def bars_rebound(access: EngineAccess, restitution: float = 0.5) -> list[Answer]
 def tip_impact(access: EngineAccess, restitution: float, turn: Sequence[float]) -> list[Answer]:
     """Throw a welded smarticle, rotated by the vector `turn` [rad], at a smooth floor; one sphere touches."""
     one = scene(access, contact={"restitution": restitution, "friction_wall": 0})
-    law, boxes, particle, speed = law_of(one), one.smarticle.boxes, one.particle, 0.02
+    law, boxes, particle, speed = law_of(one), one.smarticle.boxes, one.body, 0.02
     pose = Rotation.from_rotvec(turn)
     ends = pose.apply(access.ends(particle))
     heights, arm = np.sort(ends[:, 2]), ends[np.argmin(ends[:, 2])]
@@ -362,18 +362,18 @@ def bounce_errors(access: EngineAccess, steps: Sequence[float], *, restitution: 
 def _collided(access: EngineAccess, law: ContactLaw, dt: float, gap: float, *, tilted: bool) -> Array:
     """Simulate a collision of two smarticles from a `gap` [m]; return all sphere centres, (S, 3) [m]."""
     one = scene(access)
-    engine = access.build(one.particle, law, dt=dt)
+    engine = access.build(one.body, law, dt=dt)
     add(engine, (0, 0, 0.1))
     other = Rotation.from_rotvec([0.5, 0.2, 0.6] if tilted else [0, 0, 0.6])
-    first = access.swept(one.particle)
+    first = access.swept(one.body)
     # The second smarticle is placed above the first along y, at a distance `gap` between the closest spheres.
     apart = other.apply(first)[None] - first[:, None]
-    inside = 4 * one.particle.radius**2 - apart[..., 0] ** 2 - apart[..., 2] ** 2
+    inside = 4 * one.body.radius**2 - apart[..., 0] ** 2 - apart[..., 2] ** 2
     lift = float((np.sqrt(np.maximum(inside, 0.0)) - apart[..., 1])[inside > 0].max())
     add(engine, (0, lift + gap, 0.1), other)
     access.push(engine, 1, velocity=(0, -0.2, 0))
     engine.advance(round(5.12e-3 / dt))
-    spheres: Array = engine.state().smarticles.spheres(one.particle).reshape(-1, 3)
+    spheres: Array = engine.state().smarticles.spheres(one.body).reshape(-1, 3)
     return spheres
 
 

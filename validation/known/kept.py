@@ -107,7 +107,7 @@ for _law, _damping in (("halt", 0.0), ("stall", 0.0), ("ease", 0.0), ("slip", 0.
 )
 def thousand_turns(access: EngineAccess) -> list[Answer]:
     one, rate = scene(access), 60.0
-    engine = access.build(one.particle, law_of(one), dt=time_step(one))
+    engine = access.build(one.body, law_of(one), dt=time_step(one))
     spins = np.array([[rate, 1.0, 0.5], [1.0, rate, 0.5], [30.0, 30.0, 43.0]])
     for k, spin in enumerate(spins):
         add(engine, (0.2 * k - 0.2, 0, 0.1), Rotation.random(random_state=k))
@@ -177,7 +177,7 @@ def thrown_at(access: EngineAccess, *, stiffness: float, throws: int = 30) -> li
     law, dt, rng = law_of(one), time_step(one), np.random.default_rng(1)
     crossed, met = 0, 0
     for _ in range(throws):
-        engine = access.build(one.particle, law, dt=dt)
+        engine = access.build(one.body, law, dt=dt)
         add(engine, (0, 0, 0.1), Rotation.random(random_state=rng))
         across, up = rng.uniform(-4e-3, 4e-3, 2)
         add(engine, (0.03, across, 0.1 + up), Rotation.random(random_state=rng))

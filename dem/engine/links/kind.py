@@ -54,7 +54,7 @@ class LinksKind:
                 return min(filament_stable_time_step(rod, law, shapes[0].effective_mass) for rod in rods)
             return rigid_stable_time_step(shapes, law)
         return links_stable_time_step(
-            scene.particle,
+            scene.body,
             contact_law_of(scene),
             articulated=articulated,
             strings=scene.pulled_by,

@@ -38,13 +38,13 @@ class YadeKind:
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         law = contact_law_of(scene)
         if articulated and scene.channel is not None:
-            return planar_stable_time_step(scene.particle, law, hinge_law(scene), scene.pulled_by)
+            return planar_stable_time_step(scene.body, law, hinge_law(scene), scene.pulled_by)
         rods = [body.filament for body in scene.bodies if body.filament is not None]
         if rods:
             return min(filament_stable_time_step(rod, law) for rod in rods)
         stable = min(stable_time_step(body, law) for body in scene.bodies)
         if articulated:
-            stable = min(stable, hinged_stable_time_step(scene.particle, law, hinge_law(scene)))
+            stable = min(stable, hinged_stable_time_step(scene.body, law, hinge_law(scene)))
         return stable
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:

@@ -16,13 +16,13 @@ def rest(scene: Scene) -> State:
     poses = chain_of(scene).poses()
     still = np.zeros_like(poses.positions)
     rotations = np.array([rotation.as_matrix() for rotation in poses.rotations])
-    return State.rigid(scene.particle.boxes, poses.positions, rotations, still, still)
+    return State.rigid(scene.body.boxes, poses.positions, rotations, still, still)
 
 
 def test_the_chain_is_laid_out_hooked_and_a_gap_apart() -> None:
     scene = chain()
     layout, state, d = chain_of(scene), rest(scene), scene.sphere_diameter
-    spheres = state.spheres(scene.particle)
+    spheres = state.spheres(scene.body)
     for k in range(5):
         apart = np.linalg.norm(spheres[k][:, None] - spheres[k + 1][None], axis=-1).min()
         # The nearest spheres of two rows need not face each other.
@@ -49,7 +49,7 @@ def test_the_chain_is_laid_out_hooked_and_a_gap_apart() -> None:
 def test_a_chain_of_thicker_bodies_is_as_wide_as_two_and_hooked_a_gap_apart() -> None:
     scene = chain({"smarticle.middle_thickness_in_plane_m": 0.021})
     layout, state, d = chain_of(scene), rest(scene), scene.sphere_diameter
-    spheres = state.spheres(scene.particle)
+    spheres = state.spheres(scene.body)
     # Barb, gap and half a body from row to row, and half a body beyond each.
     assert layout.width == pytest.approx(0.0467 + 0.00105 + 1.5 * 0.021)
     assert np.ptp(spheres[..., 1]) + d == pytest.approx(layout.width)

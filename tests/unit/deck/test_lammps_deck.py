@@ -37,7 +37,7 @@ def source(folder: Path) -> Path:
     run = SyntheticRun(count=2, phases=("deposit", "relax"))
     folder.mkdir()
     write_manifest(folder, run)
-    boxes = parse_scene(SMALL, source="x").particle.boxes
+    boxes = parse_scene(SMALL, source="x").body.boxes
     turns = np.array([np.eye(3), Rotation.from_rotvec([0.5, 1.0, 0.3]).as_matrix()])
     places = np.array([[-0.015, 0.0, 1e-3], [0.015, 0.0, 1e-3 + 2 * HEIGHT]])
     still = np.zeros((2, 3))
@@ -59,7 +59,7 @@ def words(deck: str, first: str) -> list[list[str]]:
 def test_spheres_and_bodies_are_those_of_the_scene(tmp_path: Path) -> None:
     scene = scene_of(source(tmp_path / "run"))
     write_deck(scene, tmp_path / "deck")
-    particle, given = scene.particle, passive(scene)
+    particle, given = scene.body, passive(scene)
     count = len(particle.centres)
     text = (tmp_path / "deck" / DATA).read_text().partition("Atoms # hybrid sphere bond\n\n")
     rows = np.array([line.split() for line in text[2].splitlines()], float)
@@ -176,9 +176,9 @@ def test_lammps_takes_it_as_it_is(tmp_path: Path) -> None:
         assert drop == pytest.approx([0, 0, 9.81 * (step * dt) ** 2 / 2], abs=9.81 * step * dt * dt)
         assert np.abs(frames[step][1, 6:] - frames[0][1, 6:]).max() < 1e-9
     # The other one comes to rest on its spheres, where their springs bear its weight; the first phases are 0.15 s.
-    radius = scene.particle.radius
+    radius = scene.body.radius
     rested = frames[max(step for step in frames if step * dt < 0.15)]
-    sunk = scene.particle.boxes.mass * 9.81 / 250 / len(scene.particle.centres)
+    sunk = scene.body.boxes.mass * 9.81 / 250 / len(scene.body.centres)
     assert rested[0, 2] == pytest.approx(radius - sunk, abs=0.2 * sunk)
     assert np.abs(rested[0, 3:6]).max() < 1e-3
     # Shaken at 2 g it is thrown up: higher than the floor goes.

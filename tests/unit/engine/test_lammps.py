@@ -63,7 +63,7 @@ def test_what_it_cannot_compute_is_rejected_by_name_when_the_scene_is_read(
 
 def test_damping_is_given_by_mass_as_lammps_multiplies_it() -> None:
     scene = small()
-    law, mass = contact_law(scene.particle, scene.contact, 250.0), scene.particle.boxes.mass
+    law, mass = contact_law(scene.body, scene.contact, 250.0), scene.body.boxes.mass
     between, wall = (
         [float(value) for value in terms.split() if value[0].isdigit()] for terms in contact_terms(law, mass)
     )
@@ -123,10 +123,10 @@ def test_floor_and_wall_are_where_lammps_s_variables_put_them(
 def test_contacts_are_those_of_all_pairs_of_spheres(boundaries: LammpsBoundaries) -> None:
     # Spheres of one smarticle overlap.
     scene, rng = small({"fidelity": {"base": "draft", "pitch": 0.7}}), np.random.default_rng(3)
-    count, radius = 12, scene.particle.radius
+    count, radius = 12, scene.body.radius
     places = np.column_stack([rng.uniform(-0.009, 0.009, (count, 2)), rng.uniform(0.005, 0.012, count)])
     turns, still = Rotation.random(count, random_state=rng).as_matrix(), np.zeros((count, 3))
-    spheres = State.rigid(scene.particle.boxes, places, turns, still, still).spheres(scene.particle)
+    spheres = State.rigid(scene.body.boxes, places, turns, still, still).spheres(scene.body)
     found = Contacts.of(spheres, radius, boundaries)
     touches, neighbours, depths = np.zeros(count, int), np.zeros(count, int), []
     for k in range(count):
@@ -145,7 +145,7 @@ def test_contacts_are_those_of_all_pairs_of_spheres(boundaries: LammpsBoundaries
     assert neighbours.max() > 1
     assert np.array_equal(found.touches(), touches)
     assert np.array_equal(found.neighbours(), neighbours)
-    law = contact_law(scene.particle, scene.contact, 250.0)
+    law = contact_law(scene.body, scene.contact, 250.0)
     overlaps = found.overlaps(radius, law)
     assert overlaps.deepest == pytest.approx(max(depths), rel=1e-12)
     assert 0 < overlaps.deep.sum() < count
@@ -182,7 +182,7 @@ def test_what_is_missing_is_named_and_no_directory_is_left(
     programs(**there)
     way_out = r"`make setup-mpi` or `apt-get install lammps openmpi-bin`, or use engine: yade"
     with pytest.raises(RunError, match=rf"^engine: lammps needs the program {missing}, .*; install it with {way_out}"):
-        run_scene(small({"engine": "lammps"}), tmp_path / "run", command="test", progress=False)
+        run_scene(small({"engine": "lammps"}), tmp_path / "run", command="test")
     assert not (tmp_path / "run").exists()
 
 

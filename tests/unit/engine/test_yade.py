@@ -41,7 +41,7 @@ def limit_of_a_flat_pile(scene: Scene, layers: int, *, rolling: bool = False) ->
 
     They move up and down, or all roll about the axis about which they have the least inertia.
     """
-    particle, law = scene.particle, contact_law_of(scene)
+    particle, law = scene.body, contact_law_of(scene)
     springs, neighbour, stiffness, share = len(particle.centres) / particle.boxes.mass, -1, law.normal_stiffness, 1.0
     if rolling:
         # Surfaces that face each other part where both roll in the same sense.
@@ -85,7 +85,7 @@ CHANGES: list[dict[str, object]] = [
 @pytest.mark.parametrize("changes", CHANGES)
 def test_stable_step_equals_the_limit_of_the_iterated_schemes(changes: dict[str, object]) -> None:
     scene = small(changes)
-    particle, law = scene.particle, contact_law_of(scene)
+    particle, law = scene.body, contact_law_of(scene)
     light, contacts = particle.smallest_effective_mass, CONTACTS_AT_A_TIP
     limits = [
         limit_by_iteration(contacts * law.normal_stiffness, contacts * damping, moved)
@@ -100,7 +100,7 @@ def test_stable_step_equals_the_limit_of_the_iterated_schemes(changes: dict[str,
 @pytest.mark.parametrize("changes", CHANGES)
 def test_stable_step_is_stable_for_piles_lying_flat(changes: dict[str, object], layers: int) -> None:
     scene = small(changes)
-    assert stable_time_step(scene.particle, contact_law_of(scene)) <= limit_of_a_flat_pile(scene, layers) * (1 + 1e-3)
+    assert stable_time_step(scene.body, contact_law_of(scene)) <= limit_of_a_flat_pile(scene, layers) * (1 + 1e-3)
 
 
 KN, KS, MASS = 500.0, 400.0, 1e-4
@@ -196,7 +196,7 @@ def no_yade(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_missing_yade_leaves_no_directory(tmp_path: Path) -> None:
     out = tmp_path / "run"
     with pytest.raises(RunError, match=r"^YADE cannot be imported .* `make setup`"):
-        run_scene(small(), out, command="test", progress=False)
+        run_scene(small(), out, command="test")
     assert not out.exists()
 
 

@@ -198,7 +198,7 @@ def test_a_wall_is_removed_at_once_or_when_it_is_clear_of_the_pile() -> None:
     run_phase(scene, engine)
     assert engine.calls == [("remove_wall",)]
     scene, engine = begin({"type": "remove-container", "duration_s": 0.5, "speed_m_per_s": 0.1})
-    top = engine.state().vertices[..., 2].max() + scene.particle.radius
+    top = engine.state().vertices[..., 2].max() + scene.body.radius
     stage, bottoms = scene.phases[1].begin(scene, 1), []
     while wait := stage.proceed(engine):
         if engine.boundaries.walled:

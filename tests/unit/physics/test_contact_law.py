@@ -37,7 +37,7 @@ def test_damping_ratio_inverts_it(restitution: float) -> None:
 
 
 def test_typical_mass_by_random_pushes() -> None:
-    particle = small().particle
+    particle = small().body
     pushes = np.random.default_rng(4).normal(size=(4000, 3))
     pushes /= np.linalg.norm(pushes, axis=1)[:, None]
     arms = np.cross(particle.centres[:, None], pushes[None])
@@ -58,7 +58,7 @@ def test_law_carries_the_scenes_numbers() -> None:
             "fidelity": {"stiffness_N_per_m": 800.0},
         }
     )
-    law, mass = contact_law_of(scene), typical_effective_mass(scene.particle)
+    law, mass = contact_law_of(scene), typical_effective_mass(scene.body)
     assert (law.normal_stiffness, law.tangential_stiffness) == (800, 400)
     assert (law.friction, law.wall_friction, law.tangential_damping) == (0.3, 0.2, 0.25)
     # The same damping ratio in both: against the wall one typical mass moves, between smarticles half of it.

@@ -58,7 +58,7 @@ SCENE: Bad = [
     ({"fidelity": {"smarticle": 1}}, "fidelity", "unknown key 'smarticle'"),
     ({"fidelity": {"engine": [1]}}, "fidelity", "unknown key 'engine'"),
     ({"smarticle.aspect_ratio": 2, "smarticle.angles_deg": [105, 105]}, "smarticle.angles_deg", "105"),
-    ({"schema_version": 2}, "schema_version", "2"),
+    ({"schema_version": 3}, "schema_version", "3"),
     ({"fidelity": {"rows": 2, "diameter_m": 0.002}}, "fidelity.rows", "2"),
     ({"fidelity": {"diameter_m": 0.009}}, "fidelity.diameter_m", "0.009 m"),
     ({"phases": [{"type": "relax"}]}, "phases", "got relax"),

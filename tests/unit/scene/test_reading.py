@@ -38,6 +38,13 @@ def test_several_errors_are_reported_together(scene_data: SceneData) -> None:
     [
         ({"engine": "yad"}, "engine: 'yad' is not known; did you mean 'yade'?"),
         ({"fidelity": "standart"}, "fidelity: unknown fidelity 'standart'; did you mean 'standard'?"),
+        ({"phases.1.type": "tap"}, "phases.1.type: 'tap' is not known; did you mean 'shake', with the key taps?"),
+        ({"phases.1.type": "Pour"}, "phases.1.type: 'Pour' is not known; did you mean 'deposit'?"),
+        ({"particle": {"shape": "worm"}}, "particle.shape: 'worm' is not known; did you mean 'filament'?"),
+        (
+            {"particle": {"shape": "hook", "shank_m": 0.01, "radius_m": 0.004, "angle_deg": 3.14}},
+            "particle.angle_deg: 3.14 deg is out of range; use at least 10 deg; 3.14 rad are 179.9 deg",
+        ),
         ({"phases.1.type": "relaks"}, "phases.1.type: 'relaks' is not known; did you mean 'relax'?"),
         ({"motor": {"law": "servoo"}}, "motor.law: 'servoo' is not known; did you mean 'servo'?"),
         ({"motor": {"law": "x"}}, "motor.law: 'x' is not known; use 'halt', 'stall', 'ease', 'slip' or 'servo'"),
@@ -91,15 +98,36 @@ def test_file_that_is_no_yaml(tmp_path: Path) -> None:
         ),
         ("count.x=1", "--set count.x=1: there is no 'x' in the scene; lists are numbered from 0"),
         ("seed=[1", "--set seed=[1: the value is not valid YAML"),
-        ("smarticle.w=1", "bad.yaml: smarticle: unknown key 'w'; known keys: "),
-        ("gravity_m_per_s2=yes", "bad.yaml: gravity_m_per_s2: got the boolean true, expected a number"),
-        ("smarticle.middle_length_m=11.7", f"bad.yaml: {W_IN_MM}"),
-        ("contact.friction_wall=.nan", "bad.yaml: contact.friction_wall: nan is not a finite number; give one"),
+        ("smarticle.w=1", "--set smarticle.w=1: smarticle: unknown key 'w'; known keys: "),
+        (
+            "gravity_m_per_s2=yes",
+            "--set gravity_m_per_s2=yes: gravity_m_per_s2: got the boolean true, expected a number",
+        ),
+        ("smarticle.middle_length_m=11.7", f"--set smarticle.middle_length_m=11.7: {W_IN_MM}"),
+        (
+            "contact.friction_wall=.nan",
+            "--set contact.friction_wall=.nan: contact.friction_wall: nan is not a finite number; give one",
+        ),
     ],
 )
 def test_bad_override(tmp_path: Path, override: str, expected: str) -> None:
     message = rejected(tmp_path, GOOD, [override])
     assert message.startswith(expected) if expected.endswith(": ") else message == expected
+
+
+@pytest.mark.parametrize(
+    ("content", "overrides", "begin"),
+    [
+        (GOOD, ["seed=2", "count=0", "name=x"], "--set count=0: count: 0 is out of range"),
+        (GOOD, ["phases=[]", "phases=[{type: deposit}]", "count=0"], "--set count=0: count: "),
+        (GOOD.replace("count: 10", "count: 0"), ["seed=2"], "bad.yaml: count: 0 is out of range"),
+        (GOOD.replace("count: 10", "count: 0"), ["count=3", "seed=-1"], "--set seed=-1: seed: -1 is"),
+    ],
+)
+def test_an_error_names_the_override_that_brought_it(
+    tmp_path: Path, content: str, overrides: list[str], begin: str
+) -> None:
+    assert rejected(tmp_path, content, overrides).startswith(begin)
 
 
 BOMB = "".join(f"- &a{k} [{', '.join([f'*a{k - 1}'] * 9) if k else 'x'}]\n" for k in range(12))

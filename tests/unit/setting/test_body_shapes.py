@@ -120,7 +120,7 @@ def test_ring_approaches_its_limit() -> None:
 def test_staple_of_right_angles_is_a_smarticle() -> None:
     straight = small({"engine": "links", "smarticle.aspect_ratio": 0.7})
     body = small({"engine": "links", "particle": {"shape": "staple", "crown_m": 0.0117, "leg_m": 0.7 * 0.0117}})
-    one, other = straight.particle, body.bodies[0]
+    one, other = straight.body, body.bodies[0]
     assert isinstance(one, Particle)
     assert isinstance(other, Kind)
     assert other.mass == pytest.approx(one.mass, rel=1e-14)
@@ -153,7 +153,7 @@ def test_mixtures_have_their_shares_and_lengths() -> None:
     assert mixture is not None
     names = np.array([kind.name for kind in mixture.kinds])[mixture.of]
     assert (names == "rod").sum() == 200
-    factors = scene.shapes[0].factors  # type: ignore[index]
+    factors = scene.particle[0].factors  # type: ignore[index]
     assert factors.mean() == pytest.approx(1.0, abs=1e-12)
     assert factors.std() == pytest.approx(0.2, rel=1e-12)
     lengths = np.array([kind.size for kind in mixture.kinds])[mixture.of][names == "rod"]
@@ -173,7 +173,30 @@ def test_numbers_of_shapes_add_up() -> None:
     assert numbers_of_shapes(counted, 7) == [3, 4]
 
 
+@pytest.mark.parametrize("none", [{"share": 0}, {"count": 0}])
+def test_a_shape_of_no_body_is_as_if_it_were_not_there(none: dict[str, int]) -> None:
+    rod, ring = {"shape": "rod", "length_m": 0.02}, {"shape": "ring", "radius_m": 0.004}
+    some = {"share": 1} if "share" in none else {"count": 10}
+    mixed, alone = (small({"particle": shapes}) for shapes in ([{**rod, **none}, {**ring, **some}], ring))
+    assert mixed.mixture is not None
+    assert alone.mixture is not None
+    assert [kind.name for kind in mixed.mixture.kinds] == ["ring"]
+    assert mixed.mixture.of.tolist() == alone.mixture.of.tolist() == [0] * 10
+    assert mixed.cylinder == alone.cylinder
+    assert mixed.phases == alone.phases
+
+
+def test_some_shape_has_a_body() -> None:
+    shapes = [{"shape": "rod", "length_m": 0.02, "share": 0}] * 2
+    with pytest.raises(InputError, match=r"particle: all shares are 0, .* give one of them a share above 0"):
+        small({"particle": shapes})
+
+
 BAD = {
+    "legs in radians": (
+        {"shape": "staple", "crown_m": 0.01, "leg_m": 0.004, "angle_deg": [90, 1.57]},
+        ["shape", "1.57 rad are 89.95 deg"],
+    ),
     "legs that cross": (
         {"shape": "staple", "crown_m": 0.01, "leg_m": 0.02, "angle_deg": 30},
         ["shape", "bars 0 and 2"],

@@ -40,6 +40,16 @@ def test_every_name_is_there() -> None:
     assert smarticles.measures.packing_fraction.__module__ == "postprocess.measures.packing"
 
 
+@pytest.mark.parametrize(
+    "code",
+    ["import smarticles.measures as m", "from smarticles import measures as m", "import smarticles.measures; "
+     "m = smarticles.measures"],
+)  # fmt: skip
+def test_measures_is_a_module(code: str) -> None:
+    check = "import postprocess; assert all(getattr(m, n) is getattr(postprocess, n) for n in postprocess.__all__)"
+    assert "postprocess" in loaded_by(f"{code}; {check}")
+
+
 def test_a_table_of_a_run_has_a_row_per_phase_or_frame(write_run: WriteRun, tmp_path: Path) -> None:
     found = smarticles.read(write_run(tmp_path / "run"))
     assert smarticles.measure(found)["phase type"].tolist() == ["deposit", "relax", "shake", "relax"]
@@ -76,6 +86,37 @@ def test_a_table_of_a_sweep_has_what_it_varies(swept: smarticles.SweepDirectory)
     assert list(table.columns[:3]) == ["run", "aspect_ratio", "seed"]
     assert list(table.columns).count("seed") == 1
     assert table["aspect_ratio"].tolist() == [0.4] * 8 + [0.7] * 8
+
+
+def test_a_sweep_is_shown_in_one_line(swept: smarticles.SweepDirectory) -> None:
+    shown = f"{swept.path!s}', 4 runs, aspect_ratio: 0.4, 0.7; seed: 1, 2>"
+    assert str(swept) == repr(swept) == f"<SweepDirectory '{shown}"
+
+
+def test_a_table_has_measures_on_request(swept: smarticles.SweepDirectory) -> None:
+    column = "average crossing number mean [-]"
+    assert column not in swept.table()
+    assert swept.table(also=["crossing-number"])[column].notna().any()
+    assert swept.table(by="seed", also=["crossing-number"])[column].notna().any()
+
+
+NO_MEASURES: list[tuple[dict[str, object], str]] = [
+    ({"measures": ["phi"]}, "measures: 'phi' is text; give functions of a frame and its run"),
+    ({"measures": "phi"}, "measures: 'phi' is text; "),
+    ({"measures": min}, "measures: <built-in function min> is no list; write it in brackets"),
+    ({"measures": [3]}, "measures: 3 is no function with a name; write one"),
+    ({"also": "caging"}, r"also: 'caging' is one name; give a list, \['caging'\]"),
+    ({"also": ["cagin"]}, "also: 'cagin' is no measure on request; did you mean 'caging'"),
+]
+
+
+@pytest.mark.parametrize(("keys", "message"), NO_MEASURES)
+def test_what_is_no_measure_is_rejected(
+    swept: smarticles.SweepDirectory, keys: dict[str, object], message: str
+) -> None:
+    for table in (swept.table, lambda **more: smarticles.measure(swept[0], **more)):
+        with pytest.raises(smarticles.InputError, match=f"^{message}"):
+            table(**keys)
 
 
 def test_groups_have_means_and_standard_errors_over_runs(swept: smarticles.SweepDirectory) -> None:
@@ -157,7 +198,7 @@ def test_a_wrong_scene_is_an_input_error_in_one_line() -> None:
 
 @pytest.mark.parametrize(("vary", "message"), [
     ({"contact.frctn": [1]}, "vary: run frctn1: contact: unknown key 'frctn'"),
-    ({"phases.7.duration_s": [1]}, "vary: phases.7.duration_s: there is no '7' in the scene"),
+    ({"phases.7.duration_s": [1]}, "scene: phases.7.duration_s: there is no '7' in the scene"),
     ({"seed": [1, 1]}, "vary: repeats.seeds: a seed is given twice"),
 ])  # fmt: skip
 def test_errors_of_a_sweep_name_arguments_and_no_temporary_file(
@@ -166,6 +207,27 @@ def test_errors_of_a_sweep_name_arguments_and_no_temporary_file(
     with pytest.raises(smarticles.InputError) as raised:
         smarticles.sweep(scene_of(), tmp_path / "out", vary=vary)
     assert str(raised.value).startswith(message)
+
+
+def test_a_run_takes_the_keys_of_a_scene(tmp_path: Path) -> None:
+    keys = {"seed": 1, "count": 1, "fidelity": "draft", "phases": [{"type": "deposit"}]}
+    done = smarticles.run(keys, tmp_path / "a")
+    assert smarticles.load_scene(done.path / "scene.yaml") == smarticles.Scene(**keys)
+    with pytest.raises(smarticles.InputError, match=r"count: 0 is out of range; use at least 1"):
+        smarticles.run({**keys, "count": 0}, tmp_path / "b")
+    with pytest.raises(smarticles.InputError, match=r"scene: 5 is none; give a Scene, its keys as a mapping"):
+        smarticles.run(5, tmp_path / "b")
+    with pytest.raises(smarticles.InputError, match=r"vary: is missing; give the keys of the scene that change"):
+        smarticles.sweep(keys, tmp_path / "b")
+    with pytest.raises(smarticles.InputError, match=r"vary: run count0: count: 0 is out of range"):
+        smarticles.sweep(keys, tmp_path / "b", zip={"count": [0]})
+    assert not (tmp_path / "b").exists()
+
+
+def test_warnings_of_a_run_are_warnings_of_python(tmp_path: Path) -> None:
+    scene = scene_of(fidelity="draft", smarticle={"angles_deg": [90, 1.57]})
+    with pytest.warns(UserWarning, match=r"^smarticle\.angles_deg: 1\.57 means 1\.57°, .* write 90$"):
+        smarticles.run(scene, tmp_path / "a")
 
 
 def test_errors_of_a_run_name_arguments(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ def test_plan_in_json_and_with_other_values(scene_file: Path, smarticles: Smarti
         ("count=-3", "count"),
         ("cuont=3", "'cuont'; did you mean 'count'?"),
         ("count", "--set count: write KEY=VALUE"),
-        ("fidelity.time_step_s=1", "scene.yaml: fidelity.time_step_s: 1 s is above the stable step"),
+        ("fidelity.time_step_s=1", "--set fidelity.time_step_s=1: fidelity.time_step_s: 1 s is above the stable step"),
     ],
 )
 def test_bad_scenes_are_status_2_before_anything_is_made(

@@ -106,7 +106,7 @@ def test_default_output_lies_in_the_run_directory_and_is_not_overwritten(tmp_pat
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"view": "below"}, r"view 'below': is not known; known: front, oblique, top"),
+        ({"view": "below"}, r"view: 'below' is not known; known: front, oblique, top"),
         ({"size": (100, 400)}, r"size must be 200 to 8000 pixels each way: got 100 x 400"),
         ({"time": 99.0}, r"time must be between 0\.5 s and 22 s, the run's frames: got 99 s"),
         ({"output": "a.jpg"}, r"a\.jpg: the output must end in \.png: got '\.jpg'"),
