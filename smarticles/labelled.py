@@ -12,6 +12,8 @@ import pandas as pd
 from dem.errors import InputError
 from smarticles.measuring import follows
 
+_TEXTS = ("run", "state")  # columns that describe a run
+
 
 def dataset_of(table: pd.DataFrame, values: Sequence[Mapping[str, Any]]) -> Any:
     """Return a table with one row per run as a `Dataset` of xarray.
@@ -25,7 +27,7 @@ def dataset_of(table: pd.DataFrame, values: Sequence[Mapping[str, Any]]) -> Any:
 
     Returns:
         A dataset with a variable for each column with a unit; `attrs["units"]` is the unit. Points without a run have
-        NaN.
+        NaN. Directory and state of each run are coordinates.
 
     Raises:
         InputError: xarray is not installed.
@@ -38,9 +40,8 @@ def dataset_of(table: pd.DataFrame, values: Sequence[Mapping[str, Any]]) -> Any:
     varied = [name for name in points if points[name].nunique(dropna=False) > 1]
     rows = points.to_dict("records")
     leading = [name for place, name in enumerate(varied) if not _led(name, varied[:place], varied[place + 1 :], rows)]
-    runs = [str(run) for run in table["run"]]
     if points[leading].duplicated().any() or not leading:
-        leading, points = ["run"], points.assign(run=runs)
+        leading, points = ["run"], points.assign(run=table["run"].to_numpy())
     columns = [name for name in table.columns if str(name).endswith("]")]
     index = pd.MultiIndex.from_frame(points[leading]) if len(leading) > 1 else pd.Index(points[leading[0]])
     found = xarray.Dataset.from_dataframe(table[columns].set_axis(index))
@@ -52,11 +53,8 @@ def dataset_of(table: pd.DataFrame, values: Sequence[Mapping[str, Any]]) -> Any:
         leader = next(one for one in leading if one == "run" or follows(name, one, rows))
         known = points.drop_duplicates(leader).set_index(leader)[name]
         found = found.assign_coords({name: (leader, known.reindex(found[leader].values).to_numpy())})
-    if leading != ["run"]:
-        found = found.assign_coords(
-            run=xarray.Dataset.from_dataframe(pd.DataFrame({"run": runs}).set_axis(index))["run"]
-        )
-    return found
+    texts = [name for name in _TEXTS if name in table.columns and name not in leading]
+    return found.assign_coords(xarray.Dataset.from_dataframe(table[texts].set_axis(index)).data_vars)
 
 
 def _cell(value: Any) -> Any:

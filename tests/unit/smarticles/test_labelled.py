@@ -26,7 +26,8 @@ def test_a_grid_has_a_dimension_for_each_variable_and_nan_where_a_run_is_missing
     values: list[dict[str, Any]] = [
         {"ratio": ratio, "seed": seed, "law": "a"} for ratio in (0.4, 0.7) for seed in (1, 2, 3)
     ]
-    found = dataset_of(table_of(5), values[:5])
+    found = dataset_of(table_of(5).assign(state=["done"] * 4 + ["running"]), values[:5])
+    assert found.where(found["state"] == "done")[PHI].count() == 4
     assert dict(found.sizes) == {"ratio": 2, "seed": 3}
     assert found[PHI].sel(ratio=0.7, seed=2) == pytest.approx(0.4)
     assert found[PHI].sel(ratio=0.7, seed=3).isnull()
