@@ -12,6 +12,7 @@ number of the body of each; `segments_of` returns both for a frame, `read_centre
 from dem.record.forces import RecordedForces, read_forces
 from dem.record.frame import Frame, read_frame
 from dem.record.frames import FrameSequence, read_frames
+from dem.record.kinematics import RecordedPoses
 from dem.record.run import Run, open_run
 from dem.record.series import Series, read_series
 from postprocess.geometry.centrelines import Centrelines, read_centrelines
@@ -28,6 +29,7 @@ from postprocess.measures.crossing_number import (
     grid_points,
     region_spans,
 )
+from postprocess.measures.displacement import MeanSquaredDisplacement, mean_squared_displacement
 from postprocess.measures.entanglement import (
     CrossingPairs,
     PolygonCrossings,
@@ -36,9 +38,16 @@ from postprocess.measures.entanglement import (
     link_crossings,
     polygon_crossings,
 )
-from postprocess.measures.force_chains import force_chains, force_participation, strong_contacts
+from postprocess.measures.force_chains import (
+    ForceDistribution,
+    force_chains,
+    force_distribution,
+    force_participation,
+    strong_contacts,
+)
 from postprocess.measures.graph import EntanglementGraph, LinkLifetimes, entanglement_graph, link_lifetimes
 from postprocess.measures.heights import material_height
+from postprocess.measures.layers import HeightProfile, height_profile
 from postprocess.measures.linking import gauss_integral
 from postprocess.measures.nematic import (
     NematicOrder,
@@ -50,6 +59,12 @@ from postprocess.measures.nematic import (
     segment_order,
 )
 from postprocess.measures.packing import DEFINITIONS, PackingFraction, packing_fraction
+from postprocess.measures.pairs import (
+    OrientationCorrelation,
+    RadialDistribution,
+    orientation_correlation,
+    radial_distribution,
+)
 from postprocess.measures.profile import PackingProfile, packing_profile, profile_table
 from postprocess.measures.table import measure_run, summarise_run
 from postprocess.report.tables import write_table
@@ -65,16 +80,22 @@ __all__ = [
     "CrossingNumbers",
     "CrossingPairs",
     "EntanglementGraph",
+    "ForceDistribution",
     "Frame",
     "FrameSequence",
+    "HeightProfile",
     "LinkLifetimes",
     "Mean",
+    "MeanSquaredDisplacement",
     "NematicOrder",
+    "OrientationCorrelation",
     "PackingFraction",
     "PackingProfile",
     "PolarOrder",
     "PolygonCrossings",
+    "RadialDistribution",
     "RecordedForces",
+    "RecordedPoses",
     "Run",
     "Segments",
     "Series",
@@ -91,24 +112,29 @@ __all__ = [
     "entanglement_graph",
     "extents",
     "force_chains",
+    "force_distribution",
     "force_participation",
     "gauss_integral",
     "grid_points",
     "has_plane",
+    "height_profile",
     "link_crossings",
     "link_lifetimes",
     "material_height",
+    "mean_squared_displacement",
     "mean_with_error",
     "measure_run",
     "nematic_order",
     "open_run",
     "opening_directions",
+    "orientation_correlation",
     "packing_fraction",
     "packing_profile",
     "pairs_in_contact",
     "polar_order",
     "polygon_crossings",
     "profile_table",
+    "radial_distribution",
     "read_centrelines",
     "read_forces",
     "read_frame",

@@ -2,7 +2,8 @@
 
 The capsules, or strands, are those by which the engine represents links in contacts; a link may consist of several side
 by side. Of a sphere chain they are its envelope. GSD stores a capsule as a polyhedron of two vertices with a rounding
-radius.
+radius. Capsules share the mass and the inertia of their link. Angular momenta are quaternions, as HOOMD-blue defines
+them. Poses of whole bodies are in `log/bodies/NAME`.
 
 Source:
     https://gsd.readthedocs.io/en/stable/schema-hoomd.html and shapes.html. OVITO draws such polyhedra as capsules:
@@ -15,14 +16,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.bodies.fields import BY_NAME, Field, link_values
+from postprocess.bodies.fields import Field, link_values
 from postprocess.geometry.links import Floats, Whole
 from postprocess.measures.contacts import strands_of
 
 _NAMES: tuple[str, ...] = ("barb 1", "middle link", "barb 2")
+_OF_BODIES = (
+    "position_m", "orientation", "velocity_m_per_s", "angular_velocity_rad_per_s", "mass_kg", "moment_of_inertia_kg_m2",
+    "kind",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,13 +56,35 @@ def capsules_of(frame: Frame, run: Run) -> Capsules:
     return Capsules(ends=found.axes, body=found.body, link=found.link, types=types, type_of=type_of, radii=radii)
 
 
-def orientations(directions: Floats) -> Floats:
-    """Return unit quaternions (P, 4), real part first, that turn the z axis along directions (P, 3)."""
-    unit = directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-300)
-    unit = np.where(unit[:, 2:] < 0, -unit, unit)  # a capsule has no head
-    x, y, z = unit.T
-    turned = np.column_stack([1 + z, -y, x, np.zeros_like(z)])
-    return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True))
+@dataclass(frozen=True, kw_only=True)
+class CapsuleMotion:
+    """Poses, masses and motion of P capsules, in frames with z along the capsule and y along the link's normal."""
+
+    orientation: Floats  #: (P, 4) unit quaternions, real part first [1]
+    velocity: Floats  #: (P, 3) [m/s]
+    mass: Floats  #: (P,) mass of the link over its number of capsules [kg]
+    moment_inertia: Floats  #: (P, 3) principal moments of the link over its number of capsules [kg m²]
+    angmom: Floats  #: (P, 4) 2 q S, with the orientation q and the angular momentum S in the own frame [kg m²/s]
+
+
+def motion_of(capsules: Capsules, frame: Frame) -> CapsuleMotion:
+    """Return poses, masses and motion of the capsules of a frame, see `RecordedPoses`."""
+    links = frame.links
+    link = np.searchsorted(links.body, capsules.body) + capsules.link
+    share = 1 / np.bincount(link, minlength=len(links))[link]
+    cycle = [1, 2, 0]  # axes of a link, along which x, y and z of a capsule are
+    turns = Rotation.from_matrix(links.rotation[link][:, :, cycle])
+    spins = links.spin_kg_m2_per_s[link][:, cycle] * share[:, None]
+    quaternions = turns.as_quat(scalar_first=True)
+    real, vector = quaternions[:, :1], quaternions[:, 1:]
+    products = np.column_stack([-(vector * spins).sum(axis=1), real * spins + np.cross(vector, spins)])
+    return CapsuleMotion(
+        orientation=quaternions,
+        velocity=links.velocity_m_per_s[link],
+        mass=links.mass_kg[link] * share,
+        moment_inertia=links.moment_of_inertia_kg_m2[link][:, cycle] * share[:, None],
+        angmom=2 * products,
+    )
 
 
 def shapes_of(capsules: Capsules) -> list[dict[str, Any]]:
@@ -106,12 +134,13 @@ def write_trajectory(
             particles.types, particles.type_shapes = list(capsules.types), shapes
             particles.typeid = capsules.type_of
             particles.position = capsules.ends.mean(axis=1)
-            particles.orientation = orientations(capsules.ends[:, 1] - capsules.ends[:, 0])
+            motion = motion_of(capsules, frame)
+            for name in ("orientation", "velocity", "mass", "moment_inertia", "angmom"):
+                setattr(particles, name, getattr(motion, name))
             particles.diameter = 2 * capsules.radii[capsules.type_of]
             particles.body = frame.smarticle_ids[capsules.body]
-            velocity = np.asarray(link_values(BY_NAME["velocity_m_per_s"], frame, run))
-            particles.velocity = velocity[capsules.body, capsules.link]
             made.log = {"time_s": np.array([frame.time]), "phase": np.array([frame.phase])}
+            made.log |= {f"bodies/{name}": getattr(frame.bodies, name) for name in _OF_BODIES}
             for field in fields:
                 values = link_values(field, frame, run)
                 if values is not None:

@@ -92,6 +92,7 @@ def _sources() -> Iterator[Path]:
     for package in (dem, postprocess):
         yield from sorted(Path(str(package.__file__)).parent.rglob("*.py"))
     # Measures of other packages.
-    takes = [getattr(measure.take, "func", measure.take) for measure in registered()]
+    functions = [getattr(measure, "function", measure.take) for measure in registered()]
+    takes = [getattr(function, "func", function) for function in functions]
     modules = {take.__module__ for take in takes if not take.__module__.startswith("postprocess.")}
     yield from (Path(str(sys.modules[name].__file__)) for name in sorted(modules))

@@ -30,9 +30,10 @@ from dem.scene.reading import dump_scene
 from dem.scene.scene import SCHEMA_VERSION, Scene
 from dem.setting.contact import PRESET
 from dem.yaml_text import load_yaml, read_text
-from postprocess.measures.registry import FrameMeasure, measure_of
+from postprocess.measures.registry import FrameMeasure, Values, measure_of
+from smarticles.labelled import dataset_of
 from smarticles.main import BAD_INPUT
-from smarticles.measuring import grouped, measured, values_in
+from smarticles.measuring import grouped, measured, of_phase, values_in
 from smarticles.notebook import show_sweep
 from smarticles.sweeps import compute, make_folder, raise_failures
 from templates.local import environment, smarticles_command
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
     from postprocess.report.series import Chart
 
 #: A measure, or a function of a frame and its run, whose name ends with the unit of its value: `top_m`
-OwnMeasure = FrameMeasure | Callable[[Frame, Run], float]
+OwnMeasure = FrameMeasure | Callable[[Frame, Run], Values]
 
 #: Values by key of the scene, with dots for nested keys; in place of a list, a mapping of names to values
 Varied = Mapping[str, Sequence[Any] | Mapping[str, Any]]
@@ -119,7 +120,8 @@ class SweepDirectory(Sequence[Run]):
                 these columns; columns "… SE […]" have the standard errors over runs.
             frames: return one row per frame; cannot be combined with `by`.
             also: names of measures that tables have on request alone, such as "crossing-number".
-            measures: further measures; a function of a frame and its run returns a number.
+            measures: further measures; a function of a frame and its run returns a number, an array of numbers or a
+                dict of these.
             jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script.
 
         Returns:
@@ -132,6 +134,31 @@ class SweepDirectory(Sequence[Run]):
             raise InputError("by: averages over phases of runs; leave frames out")
         table = measured([self.path], frames=frames, also=_names(also), measures=_measures(measures), jobs=jobs)
         return table if by is None else grouped(table, [by] if isinstance(by, str) else list(by))
+
+    def to_xarray(
+        self,
+        *,
+        phase: str = "last",
+        also: Sequence[str] = (),
+        measures: Sequence[OwnMeasure] = (),
+        jobs: int = 1,
+    ) -> Any:
+        """Return the measures of one phase of all runs as a `Dataset` of xarray, see `dataset_of`.
+
+        Args:
+            phase: type of phase; "last": the last phase of each run.
+            also: names of measures on request, as for `table`.
+            measures: further measures, as for `table`.
+            jobs: number of processes, as for `table`.
+
+        Raises:
+            InputError: xarray is not installed, no run has frames yet, or no run has the phase.
+        """
+        table = self.table(also=also, measures=measures, jobs=jobs)
+        # A run may have several phases of one type.
+        table = of_phase(table, phase).drop_duplicates("run", keep="last")
+        known = {str(self.folder.run(entry)): entry.values for entry in self.folder.entries}
+        return dataset_of(table, [known[str(run)] for run in table["run"]])
 
 
 def run(
@@ -236,8 +263,8 @@ def measure(
         run: run, or its directory.
         frames: return one row per frame.
         also: names of measures that tables have on request alone, such as "crossing-number".
-        measures: further measures; a function of a frame and its run returns a number. Its name ends with the unit:
-            `top_m` makes the column `top [m]`.
+        measures: further measures; a function of a frame and its run returns a number, an array of numbers or a dict of
+            these. Names of functions and of the dict's keys end with the unit: `top_m` makes the column `top [m]`.
 
     Returns:
         One row per phase, with means over its last frames and their standard errors, or one row per frame. Column

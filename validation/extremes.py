@@ -119,6 +119,10 @@ DEPTH = {"draft": 0.24, "standard": 0.17, "reference": 0.12}
 name promises."""
 SOFTEST = 0.5  # the same for scenes that give a stiffness of their own
 ENERGY = 0.01  # largest excess of energy, over the supplied energy
+STORED = (
+    "kinetic_energy", "gravitational_energy", "contact_elastic_energy", "hinge_elastic_energy", "stretching_energy",
+    "bending_energy", "twisting_energy", "joint_energy", "pin_energy",
+)  # fmt: skip
 INSIDE = 1e-3  # least distance of a crossing from the ends of a segment, over the length of the segment
 
 
@@ -271,10 +275,7 @@ def energy_errors(path: Path) -> tuple[float, float]:
 
     given = column("added_energy_J")
     works = column("motor_work_J") + column("container_work_J")
-    stored = sum(
-        column(name)
-        for name in ("kinetic_energy_J", "gravitational_energy_J", "contact_elastic_energy_J", "hinge_elastic_energy_J")
-    )
+    stored = sum(column(f"{name}_J") for name in STORED)
     scale = np.maximum.accumulate(np.abs(given) + np.abs(works))
     scale = np.where(scale > 0, scale, np.inf)
     excess = ((stored - given - works) / scale).max()

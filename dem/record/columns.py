@@ -77,7 +77,7 @@ LEDGER_COLUMNS = _columns(
     whole_names=True,
     added_energy_J="energy of smarticles when they were added, zero at the floor's height at the start",
     contact_elastic_energy_J="energy in the springs of all contacts",
-    hinge_elastic_energy_J="energy in the pins and dampers of all hinges",
+    hinge_elastic_energy_J="energy in the pins and dampers of all hinges; not recorded for filaments and chains",
     dissipated_energy_J="energy dissipated by contacts, hinges and welding since the start, sampled",
     energy_residual_J="added energy and work less all energy stored and dissipated: the ledger's error",
 )
@@ -126,10 +126,9 @@ STRAIN_COLUMNS = _columns(
 )
 # In scenes with filaments.
 FILAMENT_COLUMNS = _columns(
-    stretching_energy_J="energy of stretched filaments; hinge_elastic_energy_J has it, too",
-    bending_energy_J="energy of filaments bent away from the curvature that they prefer; hinge_elastic_energy_J "
-    "has it, too",
-    twisting_energy_J="energy of twisted filaments; hinge_elastic_energy_J has it, too",
+    stretching_energy_J="energy of stretched filaments",
+    bending_energy_J="energy of filaments bent away from the curvature that they prefer",
+    twisting_energy_J="energy of twisted filaments",
     active_work_J="work of filaments that bend by themselves, since the start",
     grip_work_J="work of grips on filaments since the start; container_work_J has it, too",
     drag_loss_J="energy taken by the liquid's drag since the start; dissipated_energy_J has it, too",
@@ -138,8 +137,8 @@ FILAMENT_COLUMNS = _columns(
 )
 # In scenes with chains of links.
 JOINT_COLUMNS = _columns(
-    joint_energy_J="energy of elastic joints; hinge_elastic_energy_J has it, too",
-    pin_energy_J="energy of the springs that keep joints together; hinge_elastic_energy_J has it, too",
+    joint_energy_J="energy of elastic joints",
+    pin_energy_J="energy of the springs that keep joints together",
     pin_gap_m="widest gap between ends of links at a joint",
     joint_motor_torque_N_m="greatest torque of a joint's motor, in the last step",
     joint_motor_work_J="work of the motors of joints, since the start",

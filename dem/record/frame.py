@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NoReturn
@@ -19,8 +20,10 @@ from dem.body.kinds import Kind, Mixture
 from dem.body.particle import LINKS, Particle
 from dem.body.state import BarState, PileState
 from dem.notebook import Facts, Shown
+from dem.record.document import Manifest
 from dem.record.files import cannot_read
-from dem.record.names import FRAME, SCENE, VTKHDF, collection
+from dem.record.kinematics import RecordedPoses, poses_of_bars, poses_of_bodies
+from dem.record.names import FRAME, MANIFEST, SCENE, VTKHDF, collection
 from dem.record.vtkhdf import REMEDY, read_step
 
 VERTICES = 4
@@ -231,6 +234,25 @@ class Frame(Shown):
     def kind(self) -> Numbers:
         """(N,) kind of each body, as index of `Manifest.kinds`; 0 for smarticles."""
         return np.zeros(self.count, np.int64) if self.bars is None else self.bars.kind
+
+    @property
+    def normals(self) -> Array | None:
+        """(M, 3) normals of bars, zeros where the section is round [1]; None for smarticles."""
+        return None if self.bars is None else self.bars.normals
+
+    @cached_property
+    def _manifest(self) -> Manifest:
+        return Manifest.read(self.directory / MANIFEST)
+
+    @cached_property
+    def links(self) -> RecordedPoses:
+        """Poses, velocities, masses and inertias of all M bars, or links, in the order of `segments`."""
+        return poses_of_bars(self, self._manifest)
+
+    @cached_property
+    def bodies(self) -> RecordedPoses:
+        """Poses, velocities, masses and inertias of all N bodies."""
+        return poses_of_bodies(self, self._manifest, self.links)
 
 
 def read_frame(path: Path | str, number: int | None = None) -> Frame:

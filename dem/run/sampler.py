@@ -16,6 +16,7 @@ from dem.plan.effects import ADDS
 from dem.record.columns import COLUMNS, EVERY, GRIP_COLUMNS, STRAIN_COLUMNS, Columns
 from dem.record.packing import packing_fraction
 
+HINGE_ENERGY = "hinge_elastic_energy_J"
 KEPT = ("before", "hooks", "plate", "grips", "grips_made", "strain")  # keys of `Sampler.memory`
 
 
@@ -33,6 +34,8 @@ class Sampler:
     def described(self) -> Columns:
         """Descriptions of the columns that rows have, by name."""
         added = {name for effect in self.effects if effect in ADDS for name in ADDS[effect].series}
+        if self.effects & {EffectName.FILAMENTS, EffectName.JOINTS}:
+            added -= {HINGE_ENERGY}  # the elastic energies of these bodies have columns of their own
         return {name: column for name, column in EVERY.items() if name in COLUMNS or name in added}
 
     def sample(self, engine: Engine, state: PileState, phase: int) -> dict[str, Any]:
@@ -95,6 +98,8 @@ class Sampler:
             }
         if EffectName.ENERGY_ACCOUNT in self.effects:
             row |= _ledger_row(engine, row)
+            if engine.filaments is not None:
+                del row[HINGE_ENERGY]
         return row | extra
 
     def _mean_force(self, engine: Engine, momentum: Array) -> Array:
@@ -221,7 +226,7 @@ def _ledger_row(engine: Engine, row: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "added_energy_J": engine.ledger.added,
         "contact_elastic_energy_J": contacts,
-        "hinge_elastic_energy_J": hinges,
+        HINGE_ENERGY: hinges,
         "dissipated_energy_J": engine.ledger.dissipated,
         "energy_residual_J": given - stored - engine.ledger.dissipated,
     }

@@ -127,6 +127,12 @@ def _local_packing(frame: Frame, run: Run) -> Floats:
     return np.where(closed, run.manifest.solid_volume_m3 / np.where(closed, found, 1.0), np.nan)
 
 
+def _crossings(frame: Frame, _: Run) -> Floats:
+    """Return the crossings (N,) [-] of bodies; NaN for those that span no plane."""
+    crossings, planes = frame_crossings(frame)
+    return np.where(planes, crossings, np.nan)
+
+
 def _pressed(frame: Frame, _: Run) -> Floats:
     forces = read_forces(frame)
     found, between = forces.contacts, forces.between
@@ -212,8 +218,8 @@ FIELDS: tuple[Field, ...] = (
     Field(
         "crossings",
         "-",
-        "links of others that pass through its plane; their mean is ⟨N⟩",
-        lambda frame, _: frame_crossings(frame)[0],
+        "links of others that pass through its plane; their mean is ⟨N⟩; NaN for bodies without a plane, such as rods",
+        _crossings,
         kind="count",
         label="links of others through its plane",
         available_for=any_in_space,

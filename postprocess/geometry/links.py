@@ -7,6 +7,7 @@ the volumes that a sphere sweeps along the links.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
 from dem.errors import InputError
+from dem.record.frame import Frame
+from dem.record.frames import FrameSequence
+from dem.record.run import Run
 
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -40,7 +44,9 @@ def checked_vertices(vertices: Vertices) -> Floats:
     """
     array = np.asarray(vertices, dtype=np.float64)
     if array.ndim == 3 and array.shape[1] == 0 and len(array):
-        raise InputError(f"{len(array)} bodies of a scene with the key particle have no barbs: measure frame.segments")
+        raise InputError(
+            f"{len(array)} bodies of a scene with the key particle have no barbs: use frame.segments, frame.bodies"
+        )
     if array.ndim != 3 or array.shape[1:] != (4, 3):
         raise InputError(f"vertices must be (N, 4, 3) [m]: got {array.shape}; pass frame.vertices")
     finite = np.isfinite(array).all(axis=(1, 2))
@@ -59,13 +65,41 @@ def link_lengths(vertices: Floats) -> Floats:
     return lengths
 
 
-def centres_of_mass(vertices: Vertices) -> Floats:
-    """Return the centres of mass (N, 3) [m] of smarticles whose three links have equal cross-sections."""
-    vertices = checked_vertices(vertices)
+def centres_of_mass(bodies: Vertices | Frame | FrameSequence | Run) -> Floats:
+    """Return the centres of mass of all bodies [m].
+
+    Args:
+        bodies: A frame with bodies of any shape; a run, or some of its frames; or vertices (N, 4, 3) [m] of smarticles
+            whose three links have equal cross-sections.
+
+    Returns:
+        (N, 3), or (T, N, 3) for T frames, with NaN where a body is not poured yet.
+
+    Raises:
+        InputError: Vertices have another shape, or a file of the run is missing or damaged.
+    """
+    if isinstance(bodies, Frame):
+        return bodies.bodies.position_m
+    if isinstance(bodies, Run | FrameSequence):
+        return over_time(bodies.frames if isinstance(bodies, Run) else bodies, lambda frame: frame.bodies.position_m)
+    vertices = checked_vertices(bodies)
     weights = link_lengths(vertices)[:, :, None]
     middles = (vertices[:, :-1] + vertices[:, 1:]) / 2
     centres: Floats = (weights * middles).sum(axis=1) / weights.sum(axis=1)
     return centres
+
+
+def over_time(frames: FrameSequence, take: Callable[[Frame], Floats]) -> Floats:
+    """Return values (T, N, …) of the bodies of T frames, in the order of their numbers.
+
+    `take` returns the values (n, …) of the bodies of a frame; a body that is not poured yet has NaN.
+    """
+    each = [(frame.smarticle_ids, take(frame)) for frame in frames]
+    numbers = np.unique(np.concatenate([ids for ids, _ in each])) if each else np.empty(0, np.int64)
+    found = np.full((len(each), len(numbers), *(each[0][1].shape[1:] if each else (3,))), np.nan)
+    for row, (ids, values) in zip(found, each, strict=True):
+        row[np.searchsorted(numbers, ids)] = values
+    return found
 
 
 def bounding_spheres(vertices: Floats) -> tuple[Floats, Floats]:

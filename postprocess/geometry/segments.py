@@ -5,6 +5,7 @@ segment, `body` an array (M,) with the number of the body that each segment belo
 in ascending order of these numbers.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -46,13 +47,51 @@ class Curve:
     flaw: str = ""  #: Reason why the segments do not form one curve; empty if they do
 
 
-def segments_of(frame: Frame) -> Segments:
-    """Return the segments of all bodies of a frame, without links of length 0.
+def segments_of(bodies: Frame | Sequence[ArrayLike], *, closed: bool = False) -> Segments:
+    """Return the segments of all bodies of a frame, or of a list of polylines, without those of length 0.
 
-    The number of a body is its index in the frame, as in `Frame.contacts`.
+    The number of a body is its index in the frame, as in `Frame.contacts`, or in the list.
+
+    Args:
+        bodies: A frame, or polylines, each the points (n, 3) [m] of one body in order.
+        closed: Whether a segment joins the last point of each polyline to its first one.
+
+    Raises:
+        InputError: A polyline is not (n, 3) finite numbers with 2 different points or more.
+
+    Example:
+        >>> segments, body = segments_of([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 2], [0, 0, 3]]])
+        >>> segments.shape, body.tolist()
+        ((3, 2, 3), [0, 0, 1])
     """
-    real = np.any(frame.segments[:, 0] != frame.segments[:, 1], axis=1)
-    return Segments(frame.segments[real], frame.body[real])
+    if isinstance(bodies, Frame):
+        segments, body = bodies.segments, bodies.body
+    else:
+        lines = [_checked_polyline(line, number) for number, line in enumerate(bodies)]
+        if closed:
+            lines = [np.concatenate([line, line[:1]]) for line in lines]
+        parts = [np.stack([line[:-1], line[1:]], axis=1) for line in lines]
+        segments = np.concatenate([np.empty((0, 2, 3)), *parts])
+        body = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    real = np.any(segments[:, 0] != segments[:, 1], axis=1)
+    return Segments(segments[real], body[real])
+
+
+def _checked_polyline(points: ArrayLike, number: int) -> Floats:
+    try:
+        line = np.asarray(points, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"polyline {number}: is no array of numbers; give its points (n, 3) [m]") from None
+    if line.ndim != 2 or line.shape[1] != 3:
+        raise InputError(
+            f"polyline {number}: its points must be (n, 3) [m]: got {line.shape}; give a list of polylines"
+        )
+    finite = np.isfinite(line).all(axis=1)
+    if not finite.all():
+        raise InputError(f"polyline {number}: point {int(np.argmin(finite))} is not finite [m]; leave it out")
+    if not (line != line[:1]).any():
+        raise InputError(f"polyline {number}: has no 2 different points; leave it out")
+    return line
 
 
 def checked_segments(segments: ArrayLike, body: ArrayLike) -> Segments:

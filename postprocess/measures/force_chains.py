@@ -11,6 +11,7 @@ exp(-f/⟨f⟩), the fraction e⁻¹ = 0.37 is strong and carries 2/e = 0.74 of 
 """
 
 import math
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -54,6 +55,44 @@ def strong_contacts(normal: ArrayLike) -> Flags:
     normal = checked_forces(normal)
     strong: Flags = normal > normal.mean()
     return strong
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ForceDistribution:
+    """Probability density P(f/⟨f⟩) of normal forces f at contacts in B intervals."""
+
+    edges: Floats = field(repr=False)  #: (B + 1,) edges of the intervals of f/⟨f⟩ [-]
+    density: Floats = field(repr=False)  #: (B,) probability density [-]
+    mean_N: float  #: Mean force ⟨f⟩ [N]  # noqa: N815 - the unit
+    count: int  #: Number of forces
+
+
+def force_distribution(
+    forces: ArrayLike | RecordedForces, *, bins: int = 32, largest: float = 8.0
+) -> ForceDistribution:
+    """Compute the probability density of normal forces over their mean.
+
+    Args:
+        forces: (M,) normal forces [N]; or the recorded forces of a frame, such as `run.forces[-1]`, of which those
+            between bodies count.
+        bins: Number of intervals, of equal width.
+        largest: Largest force, over the mean [-]; larger ones count for mean and density and are in no interval.
+
+    Raises:
+        InputError: Forces are not finite numbers above 0, or `bins` or `largest` are not above 0.
+        UndefinedMeasureError: There is no force.
+
+    Example:
+        >>> force_distribution([1.0, 1.0, 1.0, 5.0], bins=2, largest=4.0).density.tolist()
+        [0.375, 0.125]
+    """
+    normal = checked_forces(forces.contacts.normal[forces.between] if isinstance(forces, RecordedForces) else forces)
+    if not (bins >= 1 and 0 < largest < math.inf):
+        raise InputError(f"intervals: got {bins} up to {largest:g} of the mean; give 1 or more, up to a number above 0")
+    found, edges = np.histogram(normal / normal.mean(), bins=bins, range=(0.0, largest))
+    return ForceDistribution(
+        edges=edges, density=found / (len(normal) * np.diff(edges)), mean_N=float(normal.mean()), count=len(normal)
+    )
 
 
 def force_participation(normal: ArrayLike) -> float:

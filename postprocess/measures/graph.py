@@ -30,7 +30,7 @@ class EntanglementGraph:
 
     @property
     def degree(self) -> Whole:
-        """Number of links of each body: (B,) int64."""
+        """(B,) number of links of each body."""
         return np.bincount(np.concatenate([self.i, self.j]), minlength=len(self.bodies))
 
     @property

@@ -5,18 +5,23 @@ columns that this function fills, with units. Tables and `smarticles measure` re
 needs its module and a test.
 """
 
+import math
 import pkgutil
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 
-from dem.errors import InputError, nearest
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dem.errors import InputError, nearest, shown
 from dem.record.frame import Frame
 from dem.record.run import Run
 from dem.record.series import Series
 from dem.strict import unit_of
+from postprocess.geometry.links import UndefinedMeasureError
 
 ENTRY_POINTS = "smarticles.measures"  #: Group of the entry points by which installed packages add their `MEASURES`
 
@@ -48,6 +53,11 @@ class Quantity:
         return f"{self.label} [{self.unit}]"
 
 
+def any_run(_: Run) -> bool:
+    """Return True: the measure applies to every run."""
+    return True
+
+
 @dataclass(frozen=True, kw_only=True)
 class FrameMeasure:
     """A measure that is computed from one frame."""
@@ -58,7 +68,7 @@ class FrameMeasure:
     #: Returns the values of a frame of a run, one per column; NaN for a value that is undefined in this frame
     take: Callable[[Frame, Run], Sequence[float]]
     #: Returns whether the measure applies to a run; tables of other runs lack its columns
-    available_for: Callable[[Run], bool] = lambda _: True
+    available_for: Callable[[Run], bool] = any_run
     definition: str | None = None  #: Key of the definition, for a quantity with several (packing fraction)
     #: Whether it takes tens of milliseconds per frame or more; tables then have its values for the last frame of each
     #: phase alone, unless the user asks for every frame
@@ -71,21 +81,57 @@ class FrameMeasure:
         return dict(zip((quantity.header for quantity in self.quantities), values, strict=True))
 
 
-def measure_of(function: Callable[[Frame, Run], float] | FrameMeasure) -> FrameMeasure:
-    """Make a measure from a function of a frame and its run; a measure is returned unchanged.
+Values = float | ArrayLike | Mapping[str, float | ArrayLike]
+"""What a function of a user returns: a number, an array of numbers, or a mapping of names to these."""
 
-    The name of the function states quantity and unit, such as `speed_m_per_s`.
+
+@dataclass(frozen=True, kw_only=True)
+class OwnFrameMeasure(FrameMeasure):
+    """A measure from a function of a user; its columns follow from what the function returns.
+
+    A number fills one column, an array one column per number, whose label ends with the index. A mapping has names of
+    quantities. Names end with the unit: `speed_m_per_s` makes the column `speed [m/s]`.
     """
+
+    function: Callable[[Frame, Run], Values]  #: The function
+
+    def columns(self, frame: Frame | None, run: Run) -> dict[str, float]:
+        """Return the values of a frame by column; none if the frame is None."""
+        if frame is None:
+            return {}
+        try:
+            values = self.function(frame, run)
+        except UndefinedMeasureError:
+            values = math.nan
+        each = values if isinstance(values, Mapping) else {self.name: values}
+        columns = {}
+        for name, value in each.items():
+            label, unit = unit_of(str(name))
+            for index, number in np.ndenumerate(self._numbers(name, value)):
+                quantity = Quantity(" ".join([label.replace("_", " "), *map(str, index)]), unit or "-")
+                columns[quantity.header] = float(number)
+        return columns
+
+    def _numbers(self, name: str, value: object) -> NDArray[np.float64]:
+        try:
+            array = np.asarray(value)
+            if array.dtype.kind in "biuf":
+                return array.astype(np.float64)
+        except ValueError:  # rows of different lengths
+            pass
+        where = self.name if name == self.name else f"{self.name}, {name!r}"
+        raise InputError(f"measure {where}: returned {shown(value)}; return a number, an array of numbers, or a dict")
+
+
+def _no_values(_frame: Frame, _run: Run) -> tuple[float, ...]:
+    return ()
+
+
+def measure_of(function: Callable[[Frame, Run], Values] | FrameMeasure) -> FrameMeasure:
+    """Make a measure from a function of a frame and its run, see `OwnFrameMeasure`; a measure is returned unchanged."""
     if isinstance(function, FrameMeasure):
         return function
-    label, unit = unit_of(function.__name__)
-    quantity = Quantity(label.replace("_", " "), unit or "-")
-    return FrameMeasure(
-        name=function.__name__,
-        place=900,
-        quantities=(quantity,),
-        take=lambda frame, run: (float(function(frame, run)),),
-    )
+    return OwnFrameMeasure(name=function.__name__, place=900, quantities=(), take=_no_values, function=function)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -43,7 +43,7 @@ def measure_run(
         costly: Frames for which costly measures are computed: "never" none, "phase-end" the last recorded frame of each
             phase, "every-frame" all.
         measures: Further measures, whose columns follow those of the registered ones.
-        also: Names of measures that tables have on request alone, such as "crossing-number".
+        also: Names of measures that tables have on request alone, such as "crossing-number", computed for every frame.
 
     Returns:
         A table with one row per frame and units in its column names. Columns of `series.h5`, if that file exists, have
@@ -57,7 +57,7 @@ def measure_run(
     rows: list[dict[str, object]] = []
     for part in _frames_by_phase(run, frames):
         known = (*frame_measures(definitions, also), *measures)
-        rows += _rows(part, run, series, known, costly, offset=len(rows))
+        rows += _rows(part, run, series, known, costly, asked=also, offset=len(rows))
     return pd.DataFrame(rows)
 
 
@@ -164,13 +164,14 @@ def _rows(
     known: Sequence[FrameMeasure],
     costly: Costly,
     *,
+    asked: Collection[str] = (),
     offset: int = 0,
 ) -> list[dict[str, object]]:
     """Return one row of a table for each of several successive frames of one phase.
 
     Values of `series`, if given, at the time of a frame are added. The measures `known` are computed if they apply to
-    the run; rows of frames for which `costly` measures are not computed have NaN, see `measure_run`. The first frame
-    has the number `offset` in the column "frame".
+    the run; rows of frames for which `costly` measures are not computed have NaN, see `measure_run`; those with a name
+    in `asked` are computed for every frame. The first frame has the number `offset` in the column "frame".
     """
     rows: list[dict[str, object]] = []
     measures = [measure for measure in known if measure.available_for(run)]
@@ -187,7 +188,11 @@ def _rows(
             "phase type": run.phases[frame.phase].type,
         }
         for measure in measures:
-            row |= measure.columns(frame if take_costly or not measure.costly else None, run)
+            taken = take_costly or not measure.costly or measure.name in asked
+            columns = measure.columns(frame if taken else None, run)
+            if twice := row.keys() & columns.keys():
+                raise InputError(f"measure {measure.name}: the table has a column {min(twice)!r} already; rename it")
+            row |= columns
         if series is not None:
             row |= _series_columns(series, frame.time)
         rows.append(row)

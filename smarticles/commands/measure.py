@@ -68,7 +68,11 @@ that runs which have not changed are not measured again.""",
     )
     measure.add_argument("--phase", metavar="NAME|last", help="only phases of this type, or the last phase of each run")
     measure.add_argument(
-        "--also", type=names, default=(), metavar="NAME,…", help="measures on request, named in the description above"
+        "--also",
+        type=names,
+        default=(),
+        metavar="NAME,…",
+        help="measures on request, named in the description above; with --frames for every frame",
     )
     profile_help = "write φ(r, z) at the end of each phase, in rings and layers of the container, as CSV"
     measure.add_argument("--profile", type=Path, metavar="FILE.csv", help=profile_help)

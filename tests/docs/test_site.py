@@ -1,5 +1,6 @@
 """The documentation builds without a warning, and its pages need no network."""
 
+import json
 import os
 import re
 import subprocess
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from pages import DOCS, REPOSITORY
+from sphinx.search.en import SearchEnglish
 
 from dem.record.columns import EVERY, FIELDS, MOTOR_FIELDS
 from dem.scene.reading import json_schema
@@ -67,6 +69,19 @@ def test_pages_load_only_local_files(site: Path) -> None:
     for path in (*site.rglob("*.css"), *site.rglob("*.js")):
         text = path.read_text(encoding="utf-8")
         assert not re.search(r"""(url\(|@import|import\(|fetch\()\s*["']?(https?:)?//""", text), path
+
+
+@pytest.mark.parametrize(
+    ("page", "words"),
+    [("how-to/functions", ["radial", "distribution"]), ("how-to/frames", ["quaternion"])],
+)
+def test_the_search_finds_what_users_look_for(site: Path, page: str, words: list[str]) -> None:
+    text = (site / "searchindex.js").read_text(encoding="utf-8")
+    index = json.loads(text[text.index("(") + 1 : text.rindex(")")])
+    number, stem = index["docnames"].index(page), SearchEnglish({}).stem
+    for word in words:
+        found = [index[where].get(stem(word), []) for where in ("terms", "titleterms")]
+        assert any(number in (each if isinstance(each, list) else [each]) for each in found), word
 
 
 def test_equations_are_mathml(site: Path) -> None:

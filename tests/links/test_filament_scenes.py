@@ -70,6 +70,15 @@ def test_a_run_that_was_stopped_while_it_wriggles_or_lifts_goes_on_with_equal_bi
         assert_goes_on(worms(), run, tmp_path / str(phase), float(begun.mean()))
 
 
+def test_the_energies_of_a_run_add_up_without_one_that_counts_twice(run: Run) -> None:
+    series = read_series(run.path)
+    given = series["added_energy_J"] + series["container_work_J"] + series["active_work_J"]
+    stored = [name for name in series.data if name.endswith("_energy_J") and name != "added_energy_J"]
+    assert {"stretching_energy_J", "bending_energy_J", "twisting_energy_J"} < set(stored)
+    spent = series["dissipated_energy_J"] + sum(series[name] for name in stored if name != "dissipated_energy_J")
+    np.testing.assert_allclose(given - spent, series["energy_residual_J"], rtol=0, atol=1e-12 * np.abs(given).max())
+
+
 def test_energy_is_accounted_for(run: Run) -> None:
     series = read_series(run.path)
     put_in = series["added_energy_J"][-1] + series["active_work_J"][-1] + series["container_work_J"][-1]

@@ -264,10 +264,12 @@ def _push_node(
     preferred[0] = factor * wave[0] * (c * wave[1] - s * wave[2])
     preferred[1] = factor * wave[0] * (s * wave[1] + c * wave[2])
     v1, v2 = bend.k1 - preferred[0], bend.k2 - preferred[1]
-    work = 0.5 * stiffness * (v1 * v1 + v2 * v2 - u1 * u1 - u2 * u2)
     slope = 1 + 0.25 * bend.twist * bend.twist  # of ν by the twist
     moments = stiffness * v1, stiffness * v2, twisting * bend.twist * slope
     r1, r2, r3 = _rates(one, two, bend, slope)
+    # The mean over the bends before and after the last sub-step, during which the preferred κ changed: second order.
+    work = 0.5 * stiffness * (v1 * v1 + v2 * v2 - u1 * u1 - u2 * u2)
+    work += 0.5 * stiffness * step.past * ((u1 - v1) * r1 + (u2 - v2) * r2)
     damping = time * stiffness * r1, time * stiffness * r2, rod[STRETCHING_TIME] * twisting * r3
     if ledger is None:
         moments = add(moments, damping)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from synthetic import RADIUS, SyntheticRun, mesh_of, u_shape, write_manifest, write_run
+from synthetic.shapes import W
 
 from dem.errors import InputError
 from dem.record.frame import Frame
@@ -35,6 +36,17 @@ def test_values_are_those_of_the_measures(pile):
     _, height = values(pile, "height_m")
     assert np.sort(height[:, 0])[-1] == pytest.approx(SyntheticRun(count=60).height(0.132), rel=0.01)
     assert values(pile, "contacts")[1][:, 0].tolist() == frame.contacts.tolist()
+
+
+def test_a_body_without_a_plane_has_no_number_of_crossings(tmp_path):
+    write_manifest(tmp_path, SyntheticRun(count=2, phases=("deposit",)))
+    bent, straight = u_shape(0.7 * W), np.linspace([-0.01, 0.001, 0], [0.01, 0.001, 0], 4)
+    # The straight one lies through the mouth of the bent one.
+    through = straight[:, [2, 1, 0]]
+    FrameWriter(tmp_path).write(mesh_of(np.array([bent, through])), 0.0)
+    _, crossings = values(tmp_path, "crossings")
+    assert crossings[0].tolist() == [1, 1, 1]
+    assert np.isnan(crossings[1]).all()
 
 
 def test_average_crossing_numbers_of_bodies_have_the_mean_of_the_measure(pile):

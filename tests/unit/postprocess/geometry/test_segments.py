@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from synthetic.curves import random_rods, rings
 
-from postprocess.geometry.segments import curves, nearest_points
+from dem.errors import InputError
+from postprocess.geometry.segments import curves, nearest_points, segments_of
 from postprocess.measures.contacts import segment_distances
 
 SQUARE = np.array([[1.0, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]])
@@ -41,3 +42,29 @@ def test_nearest_points_lie_on_the_segments_at_the_least_distance():
     for points, ends in ((on_first, first), (on_second, second)):
         parts = np.linalg.norm(points[:, None] - ends, axis=2).sum(axis=1)
         assert parts == pytest.approx(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
+
+
+def test_polylines_become_segments_in_one_call():
+    bent, rod = [[0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 2, 0]], np.array([[0.0, 0, 3], [0, 0, 4]])
+    segments, body = segments_of([bent, rod])
+    assert body.tolist() == [0, 0, 1]
+    np.testing.assert_array_equal(segments, [[[0, 0, 0], [1, 0, 0]], [[1, 0, 0], [1, 2, 0]], rod])
+    ring, body = segments_of([SQUARE], closed=True)
+    assert [one.closed for one in curves(ring, body)] == [True]
+    assert segments_of([]).segments.shape == (0, 2, 3)
+
+
+@pytest.mark.parametrize(
+    ("polylines", "words"),
+    [
+        ([SQUARE, SQUARE[:1]], ["polyline 1", "different points"]),
+        ([SQUARE, SQUARE[:, :2]], ["polyline 1", "(4, 2)"]),
+        ([np.where(SQUARE < 0, np.nan, SQUARE)], ["polyline 0", "point 1", "finite"]),
+        (SQUARE, ["polyline 0", "(3,)", "list of polylines"]),
+        ([[[0, 0, 0], [1, 0]]], ["polyline 0", "array of numbers"]),
+    ],
+)
+def test_bad_polylines_are_rejected(polylines, words):
+    with pytest.raises(InputError) as error:
+        segments_of(polylines)
+    assert all(word in str(error.value) for word in words), error.value

@@ -13,7 +13,13 @@ from dem.record.forces import has_forces, read_forces
 from dem.record.frames import read_frames
 from dem.record.run import Run, open_run
 from postprocess.geometry.links import UndefinedMeasureError
-from postprocess.measures.force_chains import MEASURES, force_chains, force_participation, strong_contacts
+from postprocess.measures.force_chains import (
+    MEASURES,
+    force_chains,
+    force_distribution,
+    force_participation,
+    strong_contacts,
+)
 from postprocess.measures.table import measure_run
 
 MEASURE = MEASURES[0]
@@ -62,3 +68,28 @@ def test_a_run_that_records_none_has_no_such_columns_and_says_how_to(run: Path) 
     assert not [name for name in measure_run(Run(run)).columns if "force" in name and "chain" in name]
     with pytest.raises(InputError, match=r"cannot read forces .*force_000000.vtu: .*recording.contact_forces: true"):
         read_forces(read_frames(run)[0])
+
+
+def test_exponential_forces_have_an_exponential_density():
+    forces = np.random.default_rng(0).exponential(0.003, 200_000)
+    found = force_distribution(forces, bins=16, largest=4.0)
+    middles = (found.edges[:-1] + found.edges[1:]) / 2
+    assert found.density == pytest.approx(np.exp(-middles), rel=0.06)
+    assert found.mean_N == pytest.approx(0.003, rel=0.02)
+    assert found.count == 200_000
+    # Forces above the largest one still count: the integral is the fraction below.
+    assert (found.density * np.diff(found.edges)).sum() == pytest.approx(1 - np.exp(-4), abs=0.002)
+
+
+def test_the_distribution_of_recorded_forces_leaves_walls_out(tmp_path):
+    directory = write_run(tmp_path, SyntheticRun(frames_per_phase=1, phases=("deposit",)))
+    write_forces(directory, pressed([(0, 1), (1, 2), (3, -1)], [1.0, 3.0, 50.0]))
+    found = force_distribution(Run(directory).forces[-1], bins=4, largest=2.0)
+    assert (found.count, found.mean_N) == (2, 2.0)
+    assert found.density.tolist() == [0, 1, 0, 1]
+
+
+@pytest.mark.parametrize("keywords", [{"bins": 0}, {"largest": 0.0}])
+def test_intervals_of_forces_must_exist(keywords):
+    with pytest.raises(InputError, match="intervals"):
+        force_distribution([1.0], **keywords)

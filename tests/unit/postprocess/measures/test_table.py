@@ -102,3 +102,12 @@ def test_summary_averages_the_last_frames_of_each_phase(make_run):
     assert shake["phi voxel [-]"] == pytest.approx(last["phi voxel [-]"].iloc[-1], nan_ok=True)
     assert np.isnan(summary["com height SE [m]"][1])
     assert (shake["name"], shake["seed"]) == ("pile", 7)
+
+
+def test_a_measure_that_is_named_fills_every_frame(make_run):
+    run = Run(make_run([(1, 0.0), (1, 0.0), (1, 0.0), (2, 0.001)]))
+    found = measure_run(run, also=["crossing-number"])
+    assert found["average crossing number mean [-]"].notna().all()
+    # Of measures that nobody named, costly ones are for the last frame of a phase.
+    voxel = next(name for name in found.columns if "voxel" in name)
+    assert found[voxel].notna().tolist() == [False, False, True, True]
