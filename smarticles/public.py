@@ -27,7 +27,7 @@ from dem.setting.contact import PRESET
 from dem.yaml_text import load_yaml, read_text
 from postprocess.measures.registry import FrameMeasure, measure_of
 from smarticles.main import BAD_INPUT
-from smarticles.measuring import grouped, measured
+from smarticles.measuring import grouped, measured, states
 from smarticles.sweeps import compute, make_folder, raise_failures
 from templates.local import environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
@@ -83,6 +83,7 @@ class SweepDirectory(Sequence[Run]):
         self,
         *,
         by: str | Sequence[str] | None = None,
+        unfinished: bool = False,
         frames: bool = False,
         measures: Sequence[OwnMeasure] = (),
         jobs: int = 1,
@@ -90,8 +91,10 @@ class SweepDirectory(Sequence[Run]):
         """Return the measures of all runs that have frames, with the sweep's variables as columns.
 
         Args:
-            by: columns, such as variables of the sweep. The result is then averaged over runs with equal values in
-                these columns; columns "… SE […]" have the standard errors over runs.
+            by: columns, such as variables of the sweep. The result is then averaged over finished runs with equal
+                values in these columns; columns "… SE […]" have the standard errors over runs. The column `state`
+                states how many runs of a group are finished.
+            unfinished: with `by`, average over unfinished runs too.
             frames: return one row per frame; cannot be combined with `by`.
             measures: further measures; a function of a frame and its run returns a number.
             jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script.
@@ -100,12 +103,20 @@ class SweepDirectory(Sequence[Run]):
             One row per run and phase, per group and phase with `by`, or per frame. Column names contain the units.
 
         Raises:
-            InputError: no run has frames yet, a column does not exist, or `by` and `frames` are combined.
+            InputError: no run has frames yet, a column does not exist, `by` and `frames` are combined, or `unfinished`
+                is given without `by`.
         """
+        if unfinished and by is None:
+            raise InputError(
+                "unfinished: is for means over runs; give by, or leave it out: without by all runs are listed"
+            )
         if by is not None and frames:
             raise InputError("by: averages over phases of runs; leave frames out")
         table = measured([self.path], frames=frames, measures=[measure_of(one) for one in measures], jobs=jobs)
-        return table if by is None else grouped(table, [by] if isinstance(by, str) else list(by))
+        if by is None:
+            return table
+        names = [by] if isinstance(by, str) else list(by)
+        return grouped(table, names, runs=states([self.path]), unfinished=unfinished)
 
 
 def run(

@@ -78,7 +78,7 @@ def test_measure_adds_measures_on_request_alone(tmp_path: Path, write_run: Write
     assert "⟨ACN⟩: average crossing number" in said.out
     unknown = smarticles("measure", run, "--also", "caging,crossing")
     assert unknown.status == 2
-    assert "also: 'crossing' is no measure on request; did you mean 'crossing-number'?" in unknown.err
+    assert "also: there is no measure 'crossing' to add; did you mean 'crossing-number'?" in unknown.err
 
 
 def test_measure_takes_a_sweep_whose_fidelity_is_a_mapping(
