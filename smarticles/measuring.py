@@ -233,11 +233,19 @@ def grouped(
         means[RUNS] = 0
     else:
         found = means_by(averaged, keys, intervals=intervals).astype(means.dtypes.to_dict())
-        means = means.merge(found, on=keys, how="left")
+        means = means.merge(found, on=keys, how="left").copy()  # in one block, else pandas warns at `insert`
         means[RUNS] = means[RUNS].fillna(0).astype(int)
     if STATE not in by:
         means.insert(means.columns.get_loc(RUNS) + 1, STATE, _finished(means, table, by, runs))
     return means
+
+
+def group_columns(means: pd.DataFrame, by: Sequence[str]) -> list[str]:
+    """Return the columns of a table of `grouped` that identify a row; `state` only if a group has unfinished runs."""
+    from postprocess.statistics.points import RUNS  # noqa: PLC0415
+
+    complete = STATE in by or all(len(set(text.split()[:3:2])) == 1 for text in means[STATE])
+    return [*by, RUNS, *([] if complete else [STATE])]
 
 
 def _finished(means: pd.DataFrame, table: pd.DataFrame, by: Sequence[str], runs: pd.DataFrame | None) -> Sequence[str]:

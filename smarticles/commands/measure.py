@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from dem.errors import InputError
 from dem.terminal import redraw, warn
 from smarticles.command_line import Cell, Commands, add_options, as_json, columns, names, reject_existing
-from smarticles.measuring import DONE, STATE, grouped, measured, of_phase, sources, states
+from smarticles.measuring import DONE, STATE, group_columns, grouped, measured, of_phase, sources, states
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -183,9 +183,7 @@ def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> s
     """Return the printed table: one row per group with `by`, otherwise a block of rows per run."""
     from postprocess.statistics.points import RUNS  # noqa: PLC0415
 
-    # The state of a group is "3 of 12 finished".
-    partly = by and STATE in table and any(len(set(text.split()[:3:2])) > 1 for text in table[STATE])
-    named = [*by, RUNS, *([STATE] if partly else [])] if by else []
+    named = group_columns(table, by) if by else []
     rows = [
         [
             *(row[name] for name in named),

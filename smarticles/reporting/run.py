@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
@@ -21,8 +22,11 @@ from dem.record.names import LOG, SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import load_scene
 from dem.scene.scene import Scene
+from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS, HEADINGS
+from postprocess.measures.pile import POUR
 from postprocess.measures.registry import Shown, shown_quantities
-from postprocess.statistics.points import format_with_error, marked
+from postprocess.measures.table import LAST_FRAMES
+from postprocess.statistics.points import RUNS, counted, format_with_error, marked
 from smarticles.command_line import format_cell
 from smarticles.measuring import has_frames, measured
 from smarticles.reporting.charts import against_time
@@ -100,15 +104,21 @@ def _measures(directory: Path) -> list[Markup]:
     if not has_frames(directory):
         return [words("No frame has been recorded, so that there are no measures.", tone="note")]
     found = measured([directory])
-    caption = "Means over the last 20 frames of each phase ± standard error; voxel and voronoi: last frame only"
+    caption = f"Means over the last {LAST_FRAMES} frames of each phase ± standard error"
+    if (found["phase type"] == POUR).any():
+        caption += "; of a pour, frames of the settled pile alone"
+    present = found.columns[found.notna().any()]
+    costly = [name for name in DEFINITIONS if name in COSTLY_DEFINITIONS and f"phi {name} [-]" in present]
+    if costly:
+        caption += f"; {' and '.join(HEADINGS[name] for name in costly)}: last frame only"
     whole = found.drop(columns=["run", "scene_sha256"])
     return [short_table(found, ["phase type"], caption), frame_table(whole, "All measures of each phase")]
 
 
-def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Markup:
+def short_table(found: pd.DataFrame, named: Sequence[str], caption: str, *, folded: bool = False) -> Markup:
     """Return a table of the main quantities of `measured` or `grouped` as `mean ± SE`.
 
-    The columns `named` identify a row.
+    The columns `named` identify a row. A mean over fewer runs than the row's has their number, `(n = 2)`.
     """
     present = found.columns[found.notna().any()]
     wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
@@ -118,12 +128,13 @@ def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Mark
             *(row[name] for name in named),
             *(
                 format_with_error(s.factor * row[name], s.form, s.factor * row.get(marked(name, "SE"), float("nan")))
+                + (f" (n = {number})" if 0 < (number := row.get(counted(name), 0)) < row[RUNS] else "")
                 for name, s in wanted
             ),
         ]
         for row in found.to_dict("records")
     ]
-    return table(caption, [*named, *(shown.heading for _, shown in wanted)], rows)
+    return table(caption, [*named, *(shown.heading for _, shown in wanted)], rows, folded=folded)
 
 
 def frame_table(found: pd.DataFrame, caption: str) -> Markup:
@@ -159,7 +170,10 @@ def picture_blocks(
             return [words(f"No picture: {error}", tone="note")]
     moment = run.phases[-1].type if run.status.state == "done" else "its last frame"
     manifest = run.manifest
-    shows = f"The {manifest.count} smarticles of {manifest.name} at the end of {moment}, drawn as boxes"
+    sections = {"cylinders" if kind.round else "boxes" for kind in manifest.kinds or ()} or {"boxes"}
+    bodies = "smarticles" if manifest.kinds is None else "bodies"
+    shows = f"The {manifest.count} {bodies} of {manifest.name} at the end of {moment}, "
+    shows += f"drawn as {' and '.join(sorted(sections))}"
     caption = f"Run {name}" if name else f"{shows}. For other views or times use smarticles render."
     blocks = [figure(caption, shows, still, "card")]
     if views:
@@ -185,10 +199,15 @@ def _curves(run: Run) -> list[Markup]:
         if name not in series.data:
             continue
         values = factor * (series[name] if component is None else series[name][:, component]).astype(float)
+        if name == "packing_fraction":
+            made = run.manifest
+            lifted = [phase.index for phase in run.phases if made.held(phase.index) or made.dropped(phase.index)]
+            values[np.isin(series["phase"], lifted)] = np.nan  # the bodies are not one pile
         if not (abs(values) > 0).any():
             continue
+        known = values[np.isfinite(values)]
         label = EVERY[name].label + ("" if component is None else f" {'xyz'[component]}")
-        alt = f"{label} against time, from {values[0]:.3g} to {values[-1]:.3g} {unit}".removesuffix(" -")
+        alt = f"{label} against time, from {known[0]:.3g} to {known[-1]:.3g} {unit}".removesuffix(" -")
         caption = f"{series.descriptions.get(name, label)}. Bands are phases."
         picture = against_time(series.time, values, f"{label} [{unit}]", spans)
         blocks.append(figure(caption[0].upper() + caption[1:], alt, picture, "chart"))
@@ -233,9 +252,15 @@ def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
         reasons = list(dict.fromkeys(one.why for one in on or decisions))
         more = [f"and {len(reasons) - _MAX_REASONS} more reasons"] if len(reasons) > _MAX_REASONS else []
         state = f"{len(on)} of {len(decisions)}" if len(decisions) > 1 else "on" if on else "off"
-        rows.append([effect.name, state, "; ".join([*reasons[:_MAX_REASONS], *more]), effect.adds.to_text()])
+        rows.append(
+            [effect.name, state, "; ".join([*reasons[:_MAX_REASONS], *more]), effect.adds.to_text(internals=False)]
+        )
     caption = "Effects and the reasons for each; an effect that is off is not computed"
-    return [table(caption, ["effect", "on in scenes", "reason", "added computation"], rows)] if rows else []
+    return (
+        [table(caption, ["effect", "on in scenes", "reason", "what it records, and work besides the steps"], rows)]
+        if rows
+        else []
+    )
 
 
 def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
@@ -246,10 +271,10 @@ def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
     if scene is None:
         return []
     base, named = scene.fidelity.base, scene.named_knobs
-    knobs = scene.fidelity.model_dump(exclude={"base"})
-    caption = f"Knobs of fidelity {base} on {scene.engine}"
-    rows = [[knob, value, named.get(knob)] for knob, value in knobs.items()]
-    blocks = [table(caption, ["knob", "this scene", base], rows)]
+    parameters = scene.fidelity.model_dump(exclude={"base"})
+    caption = f"Numerical parameters of fidelity {base} on {scene.engine}"
+    rows = [[name, value, named.get(name)] for name, value in parameters.items()]
+    blocks = [table(caption, ["parameter", "this scene", base], rows)]
     try:
         known = read_table(path, of=tuple(QUANTITIES), activity=activity_of(scene))
     except InputError as error:
@@ -270,7 +295,7 @@ def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
         for entry in known.fidelities
     ]
     notes = [] if here else [f"Fidelity {base} on {scene.engine} is not among those measured."]
-    changed = [knob for knob, value in knobs.items() if knob in named and value != named[knob]]
+    changed = [name for name, value in parameters.items() if name in named and value != named[name]]
     if changed:
         notes.append(f"This scene changes {', '.join(changed)}, which the table does not cover.")
     notes.append("The errors were measured on one pile; other piles, activities and quantities may have larger errors.")

@@ -180,8 +180,8 @@ def test_the_page_of_a_sweep_has_means_and_figures(
         write_run(folder.run(entry), packing=(0.1, 0.1, phi, phi), **{k: entry.values[k] for k in ("count", "seed")})
     assert smarticles("report", folder.path).status == 0
     page = Read(folder.path / "report.html")
-    assert page.row("5", "2")[3].startswith("0.1300 ± 0.0100")
-    assert page.row("6", "1")[3] == "0.2000"
+    assert page.row("5", "2", "2 of 2 finished")[4].startswith("0.1300 ± 0.0100")
+    assert page.row("6", "1", "1 of 2 finished")[4] == "0.2000"
     assert page.row("n6_2")[:2] == ["n6_2", "missing"]
     assert page.row("contact")[1] == "4 of 4"
     assert page.row("count", "5, 6")[2] == "2"
