@@ -43,7 +43,7 @@ def add(commands: Commands) -> None:
         render_run,
         summary="draw a picture or a film of a run",
         text="""
-Draws the boxes of all smarticles, the cylinder cut open in front, hooks, strings and a scale bar. No
+Draws all bodies by their true sections, the cylinder cut open in front, hooks, strings and a scale bar. No
 display is needed. The suffix of the output chooses between a picture (.png) and a film (.gif, .webp,
 .mp4). A film plays at a constant speed, which is written on it.""",
         examples="""\
