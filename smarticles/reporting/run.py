@@ -199,19 +199,25 @@ def _curves(run: Run) -> list[Markup]:
         if name not in series.data:
             continue
         values = factor * (series[name] if component is None else series[name][:, component]).astype(float)
-        if name == "packing_fraction":
-            made = run.manifest
-            lifted = [phase.index for phase in run.phases if made.held(phase.index) or made.dropped(phase.index)]
-            values[np.isin(series["phase"], lifted)] = np.nan  # the bodies are not one pile
+        caption = f"{series.descriptions.get(name, EVERY[name].label)}. Bands are phases."
+        lifted = _lifted(run) if name == "packing_fraction" else []
+        if lifted:
+            values[np.isin(series["phase"], lifted)] = np.nan
+            caption += " It is left out where grips or a raised hook hold bodies, or have dropped them."
         if not (abs(values) > 0).any():
             continue
         known = values[np.isfinite(values)]
         label = EVERY[name].label + ("" if component is None else f" {'xyz'[component]}")
         alt = f"{label} against time, from {known[0]:.3g} to {known[-1]:.3g} {unit}".removesuffix(" -")
-        caption = f"{series.descriptions.get(name, label)}. Bands are phases."
         picture = against_time(series.time, values, f"{label} [{unit}]", spans)
         blocks.append(figure(caption[0].upper() + caption[1:], alt, picture, "chart"))
     return blocks
+
+
+def _lifted(run: Run) -> list[int]:
+    """Return the numbers of the phases in which bodies hang or fall, so that they are not one pile."""
+    made = run.manifest
+    return [phase.index for phase in made.phases if made.held(phase.index) or made.dropped(phase.index)]
 
 
 def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:

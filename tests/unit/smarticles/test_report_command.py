@@ -22,8 +22,9 @@ from postprocess.statistics.points import means_by
 from smarticles.reporting.charts import Groups, against_variable, thinned
 from smarticles.reporting.run import accuracy_blocks, effect_blocks
 from smarticles.reporting.sweep import _figures
-from smarticles.sweeps import make_folder
+from smarticles.sweeps import changed_sweep, folder_of, make_folder
 from studies.registry import shipped
+from templates.sweep.expand import expand
 
 
 class Read(HTMLParser):
@@ -188,6 +189,16 @@ def test_the_page_of_a_sweep_has_means_and_figures(
     assert "smarticles sweep <hostile>" in page.text
     alts = [attributes["alt"] for attributes in page.of("img")]
     assert "phi second-highest-com against count, from 0.13 to 0.2" in alts
+    assert "Means over finished runs ± standard error, phase 3 (relax)." in page.text
+    # The phase that is asked for comes first; the others are folded.
+    assert smarticles("report", folder.path, "--phase", "deposit", "--overwrite").status == 0
+    page = Read(folder.path / "report.html")
+    assert page.row("5", "2", "2 of 2 finished")[4].startswith("0.1000 ± 0.000")
+    folded = page.text.count("Means over finished runs ± standard error, phase ")
+    assert folded == 1 + 2 * 3  # caption of the table, and of a folded one its summary, too
+    unknown = smarticles("report", folder.path, "--phase", "shakes", "--overwrite")
+    assert unknown.status == 2
+    assert "--phase shakes: no run has a phase 'shakes'; did you mean 'shake'?" in unknown.err
 
 
 def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
@@ -236,6 +247,45 @@ def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: Write
     # The results alone make a page as well.
     assert smarticles("report", results, "--output", tmp_path / "results.html").status == 0
     assert Read(tmp_path / "results.html").row("φ_f is above φ_0 at every l/w")
+
+
+def test_a_sweep_with_the_name_of_a_study_is_a_sweep(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    sweep_file.write_text(sweep_file.read_text().replace("name: counts", "name: friction"))
+    folder = make_folder(sweep_file, tmp_path / "friction", "test")
+    write_run(folder.run(folder.entries[0]), phases=("deposit", "relax", "shake"), frames_per_phase=1)
+    smarticles("report", folder.path)
+    page = Read(folder.path / "report.html")
+    assert "smarticles study" not in page.text
+    assert "friction – sweep" in page.text
+    # A drive is last, but the last rest comes first.
+    assert page.text.index("phase 1 (relax)") < page.text.index("phase 2 (shake)")
+
+
+@pytest.mark.parametrize(
+    ("name", "engine", "words"),
+    [
+        ("strength-code", None, "strength-code --quick"),
+        ("compaction", None, "compaction"),
+        ("compaction", "yade", "compaction --engine yade"),
+    ],
+)
+def test_a_study_is_known_by_its_files(
+    name: str, engine: str | None, words: str, tmp_path: Path, smarticles: Smarticles
+) -> None:
+    sweep = changed_sweep(shipped(name).sweep_file(quick="--quick" in words), engine=engine)
+    points = expand(sweep)[:2]
+    folder = folder_of(sweep, points, tmp_path / "mine", "test", expected_s=[1.0] * 2)
+    smarticles("report", folder.path)
+    page = Read(folder.path / "report.html")
+    assert f"smarticles study {words} --out mine --analyse" in page.text
+    manifest = folder.path / "sweep.json"
+    content = json.loads(manifest.read_text(encoding="utf-8"))
+    content["files"] = {file: f"{text}# changed" for file, text in content["files"].items()}
+    manifest.write_text(json.dumps(content), encoding="utf-8")
+    smarticles("report", folder.path, "--overwrite")
+    assert "smarticles study" not in Read(folder.path / "report.html").text
 
 
 # -- parts -------------------------------------------------------------------------------------------------------------

@@ -123,6 +123,50 @@ def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     assert "--phase shakes: no run has a phase 'shakes'; did you mean 'shake'?" in unknown.err
 
 
+def test_means_are_those_of_finished_runs_unless_asked(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    out, table = tmp_path / "out", tmp_path / "means.csv"
+    sweep_file.write_text(
+        sweep_file.read_text()
+        .replace("{count: [5, 6]}", "{count: [5, 6], kind: [a, b, c]}")
+        .replace("n{{ count }}", "n{{ count }}{{ kind }}")
+    )
+    smarticles("sweep", sweep_file, "--out", out)
+    for name, last, status in (("n5a", 0.12, "done"), ("n6a", 0.14, "failed"), ("n5b", 0.16, "unfinished")):
+        write_run(out / "runs" / name, packing=(0.1, 0.1, last, last), status=status)
+    rows = json.loads(smarticles("measure", out, "--json").out)
+    assert [row["state"] for row in rows[::4]] == ["done", "stopped", "failed"]
+    lines = smarticles("measure", out).out.splitlines()
+    assert [line for line in lines if line.endswith(":")] == [
+        f"{out}/runs/n5a:", f"{out}/runs/n5b (stopped):", f"{out}/runs/n6a (failed):"
+    ]  # fmt: skip
+    said = smarticles("measure", out, "--by", "kind", "--phase", "last", "--table", table)
+    assert said.out.splitlines()[1].split()[:6] == ["a", "1", "1", "of", "2", "finished"]
+    assert said.out.splitlines()[2].split()[:6] == ["b", "0", "0", "of", "2", "finished"]
+    assert "note: 1 of 6 runs are finished, 3 missing, 1 stopped, 1 failed; means leave them out" in said.out
+    means = pd.read_csv(table, comment="#")
+    assert means["state"].tolist() == ["1 of 2 finished", "0 of 2 finished"]
+    assert means["phi second-highest-com [-]"].iloc[0] == pytest.approx(0.12)
+    assert pd.isna(means["phi second-highest-com [-]"].iloc[1])
+    everything = json.loads(smarticles("measure", out, "--by", "kind", "--phase", "last", "--unfinished", "--json").out)
+    assert [row["phi second-highest-com [-]"] for row in everything] == pytest.approx([0.13, 0.16])
+    assert [row["runs [-]"] for row in everything] == [2, 1]
+    alone = smarticles("measure", out, "--unfinished")
+    assert (alone.status, "--unfinished: is for means over runs, which --by makes" in alone.err) == (2, True)
+
+
+def test_the_legend_is_about_columns_that_are_printed(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a", count=1)
+    out = smarticles("measure", run).out
+    assert "z: height" in out
+    assert not any(word in out for word in ("φ", "voxel", "voronoi", "peak F/nW"))
+    assert "of a pour" in out
+    assert "of a pour" not in smarticles("measure", run, "--phase", "shake").out
+
+
 def test_measure_keeps_the_tables_of_runs_that_have_not_changed(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:
