@@ -18,6 +18,7 @@ from dem.plan.choice import QUANTITIES, Error, activity_of, read_table
 from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.record.columns import EVERY
+from dem.record.document import Manifest
 from dem.record.names import LOG, SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import load_scene
@@ -170,10 +171,7 @@ def picture_blocks(
             return [words(f"No picture: {error}", tone="note")]
     moment = run.phases[-1].type if run.status.state == "done" else "its last frame"
     manifest = run.manifest
-    sections = {"cylinders" if kind.round else "boxes" for kind in manifest.kinds or ()} or {"boxes"}
-    bodies = "smarticles" if manifest.kinds is None else "bodies"
-    shows = f"The {manifest.count} {bodies} of {manifest.name} at the end of {moment}, "
-    shows += f"drawn as {' and '.join(sorted(sections))}"
+    shows = f"The {_bodies(manifest)} of {manifest.name} at the end of {moment}, drawn as {_sections(manifest)}"
     caption = f"Run {name}" if name else f"{shows}. For other views or times use smarticles render."
     blocks = [figure(caption, shows, still, "card")]
     if views:
@@ -181,6 +179,17 @@ def picture_blocks(
         how = "Move the pointer across the picture, tap, or use the arrow keys to turn it."
         blocks.append(turntable(f"{f'Run {name} from all sides' if name else around}. {how}", around, views))
     return blocks
+
+
+def _bodies(manifest: Manifest) -> str:
+    return f"{manifest.count} {'smarticles' if manifest.kinds is None else 'bodies'}"
+
+
+def _sections(manifest: Manifest) -> str:
+    """Return what the bars of a run are drawn as: boxes, cylinders, or both."""
+    if manifest.kinds is None:
+        return "boxes"
+    return " and ".join(sorted({"cylinders" if kind.round else "boxes" for kind in manifest.kinds}))
 
 
 def _curves(run: Run) -> list[Markup]:

@@ -94,6 +94,9 @@ def test_the_page_of_a_run_has_everything(run: Path, smarticles: Smarticles) -> 
     assert page.row("shake")[2].startswith("0.1300 ± 0.000")
     assert page.row("motors", "off")[2] == "no phase actuates"
     assert page.row("container motion", "on")[2].startswith("phase 2: Γ = 2")
+    # What the effect records, not the parts of the engine that compute it.
+    assert page.row("series", "on")[3].startswith("files series.h5; ")
+    assert not any("push_apart" in cell for row in page.rows for cell in row)
     assert page.row("rows") == ["rows", "2", "1"]
     assert page.row("links", "draft")[-1] == "this run"
     assert "This scene changes rows, which the table does not cover." in page.text

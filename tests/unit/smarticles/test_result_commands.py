@@ -127,29 +127,32 @@ def test_means_are_those_of_finished_runs_unless_asked(
     tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
     out, table = tmp_path / "out", tmp_path / "means.csv"
-    sweep_file.write_text(
-        sweep_file.read_text()
-        .replace("{count: [5, 6]}", "{count: [5, 6], kind: [a, b, c]}")
-        .replace("n{{ count }}", "n{{ count }}{{ kind }}")
-    )
+    text = sweep_file.read_text().replace("[5, 6]", "[5, 6, 7]").replace("n{{ count }}", "n{{ count }}_{{ seed }}")
+    sweep_file.write_text(text + "repeats: {seeds: [1, 2]}\n")
+    template = tmp_path / "scene.yaml.j2"
+    template.write_text(template.read_text().replace("seed: 1", "seed: {{ seed }}"))
     smarticles("sweep", sweep_file, "--out", out)
-    for name, last, status in (("n5a", 0.12, "done"), ("n6a", 0.14, "failed"), ("n5b", 0.16, "unfinished")):
-        write_run(out / "runs" / name, packing=(0.1, 0.1, last, last), status=status)
+    runs = {"n5_1": ("done", 0.12), "n5_2": ("failed", 0.14), "n6_1": ("unfinished", 0.16)}
+    for name, (status, last) in runs.items():
+        count, seed = (int(number) for number in name[1:].split("_"))
+        write_run(out / "runs" / name, packing=(0.1, 0.1, last, last), status=status, count=count, seed=seed)
     rows = json.loads(smarticles("measure", out, "--json").out)
-    assert [row["state"] for row in rows[::4]] == ["done", "stopped", "failed"]
+    assert [row["state"] for row in rows[::4]] == ["done", "failed", "stopped"]
     lines = smarticles("measure", out).out.splitlines()
     assert [line for line in lines if line.endswith(":")] == [
-        f"{out}/runs/n5a:", f"{out}/runs/n5b (stopped):", f"{out}/runs/n6a (failed):"
+        f"{out}/runs/n5_1:", f"{out}/runs/n5_2 (failed):", f"{out}/runs/n6_1 (stopped):"
     ]  # fmt: skip
-    said = smarticles("measure", out, "--by", "kind", "--phase", "last", "--table", table)
-    assert said.out.splitlines()[1].split()[:6] == ["a", "1", "1", "of", "2", "finished"]
-    assert said.out.splitlines()[2].split()[:6] == ["b", "0", "0", "of", "2", "finished"]
-    assert "note: 1 of 6 runs are finished, 3 missing, 1 stopped, 1 failed; means leave them out" in said.out
+    said = smarticles("measure", out, "--by", "count", "--phase", "last", "--table", table)
+    assert said.out.splitlines()[1].split()[:6] == ["5", "1", "1", "of", "2", "finished"]
+    assert said.out.splitlines()[2].split()[:6] == ["6", "0", "0", "of", "2", "finished"]
+    assert "note: 1 of 6 runs are finished, 3 missing, 1 failed, 1 stopped; means leave them out" in said.out
     means = pd.read_csv(table, comment="#")
     assert means["state"].tolist() == ["1 of 2 finished", "0 of 2 finished"]
     assert means["phi second-highest-com [-]"].iloc[0] == pytest.approx(0.12)
     assert pd.isna(means["phi second-highest-com [-]"].iloc[1])
-    everything = json.loads(smarticles("measure", out, "--by", "kind", "--phase", "last", "--unfinished", "--json").out)
+    everything = json.loads(
+        smarticles("measure", out, "--by", "count", "--phase", "last", "--unfinished", "--json").out
+    )
     assert [row["phi second-highest-com [-]"] for row in everything] == pytest.approx([0.13, 0.16])
     assert [row["runs [-]"] for row in everything] == [2, 1]
     alone = smarticles("measure", out, "--unfinished")
