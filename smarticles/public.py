@@ -169,7 +169,7 @@ def measure(
     Args:
         run: run, or its directory.
         frames: return one row per frame.
-        also: names of measures that tables have on request alone, such as "crossing-number".
+        also: names of further measures, which take long or are seldom needed, such as "crossing-number".
         measures: further measures; a function of a frame and its run returns a number. Its name ends with the unit:
             `top_m` makes the column `top [m]`.
 

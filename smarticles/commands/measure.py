@@ -53,7 +53,7 @@ the run directories, so that runs which have not changed are not measured again.
   smarticles measure friction --by friction                 means ± SE over the runs of each value
   smarticles measure friction --by friction --phase last    of the last phase of each run alone
   smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
-  smarticles measure runs/a --also crossing-number,caging   measures on request
+  smarticles measure runs/a --also crossing-number,caging   further measures
 """,
     )
     measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
@@ -69,7 +69,11 @@ the run directories, so that runs which have not changed are not measured again.
     measure.add_argument("--unfinished", action="store_true", help="with --by: average over unfinished runs too")
     measure.add_argument("--phase", metavar="NAME|last", help="only phases of this type, or the last phase of each run")
     measure.add_argument(
-        "--also", type=names, default=(), metavar="NAME,…", help="measures on request, named in the description above"
+        "--also",
+        type=names,
+        default=(),
+        metavar="NAME,…",
+        help="further measures, named in the description above",
     )
     profile_help = "write φ(r, z) at the end of each phase, in rings and layers of the container, as CSV"
     measure.add_argument("--profile", type=Path, metavar="FILE.csv", help=profile_help)

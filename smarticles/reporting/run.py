@@ -18,7 +18,7 @@ from dem.plan.choice import QUANTITIES, Error, activity_of, read_table
 from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.record.columns import EVERY
-from dem.record.document import Manifest
+from dem.record.document import Kind, Manifest
 from dem.record.names import LOG, SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import load_scene
@@ -171,7 +171,7 @@ def picture_blocks(
             return [words(f"No picture: {error}", tone="note")]
     moment = run.phases[-1].type if run.status.state == "done" else "its last frame"
     manifest = run.manifest
-    shows = f"The {_bodies(manifest)} of {manifest.name} at the end of {moment}, drawn as {_sections(manifest)}"
+    shows = f"The {_bodies(manifest)} of {manifest.name} at the end of {moment}, drawn as {drawn_as(manifest.kinds)}"
     caption = f"Run {name}" if name else f"{shows}. For other views or times use smarticles render."
     blocks = [figure(caption, shows, still, "card")]
     if views:
@@ -185,11 +185,11 @@ def _bodies(manifest: Manifest) -> str:
     return f"{manifest.count} {'smarticles' if manifest.kinds is None else 'bodies'}"
 
 
-def _sections(manifest: Manifest) -> str:
-    """Return what the bars of a run are drawn as: boxes, cylinders, or both."""
-    if manifest.kinds is None:
+def drawn_as(kinds: Sequence[Kind] | None) -> str:
+    """Return what pictures draw bodies of some kinds as: boxes, cylinders, or both; None: smarticles."""
+    if kinds is None:
         return "boxes"
-    return " and ".join(sorted({"cylinders" if kind.round else "boxes" for kind in manifest.kinds}))
+    return " and ".join(sorted({"cylinders" if kind.round else "boxes" for kind in kinds}))
 
 
 def _curves(run: Run) -> list[Markup]:

@@ -14,13 +14,14 @@ import yaml
 from command_cases import Smarticles, WriteRun
 from scenes import small
 
+from dem.record.document import Kind
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from postprocess.pictures import render
 from postprocess.report import figures
 from postprocess.statistics.points import means_by
 from smarticles.reporting.charts import Groups, against_variable, thinned
-from smarticles.reporting.run import accuracy_blocks, effect_blocks
+from smarticles.reporting.run import accuracy_blocks, drawn_as, effect_blocks
 from smarticles.reporting.sweep import _figures
 from smarticles.sweeps import changed_sweep, folder_of, make_folder
 from studies.registry import shipped
@@ -323,6 +324,33 @@ def test_charts_of_several_variables_have_intervals_and_a_part_for_each_combinat
     assert (list(xs), means) == ([5, 10, 15], pytest.approx([11.7, 16.7, 21.7]))
     assert half_widths == pytest.approx([4.303 * 0.1] * 3, rel=1e-3)  # Student's t, three values
     assert drawn[1]["omega = 0"][2] == pytest.approx([12.706 * 0.1] * 3, rel=1e-3)  # two runs
+
+
+def test_the_chart_of_a_packing_fraction_leaves_out_a_lifted_pile(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a", phases=("deposit", "relax", "pull-hook"), frames_per_phase=1)
+    smarticles("report", run)
+    page = Read(run / "report.html")
+    # φ is 0.105 at the end of the rest, and 0.130 of the made-up pull.
+    (alt,) = [alt for a in page.of("img") if (alt := a["alt"] or "").startswith("packing fraction against time")]
+    assert alt.endswith("to 0.105")
+    assert "It is left out where grips or a raised hook hold bodies" in page.text
+
+
+@pytest.mark.parametrize(
+    ("rounds", "drawn"),
+    [((), "boxes"), ((False,), "boxes"), ((True, True), "cylinders"), ((True, False), "boxes and cylinders")],
+)
+def test_captions_name_the_sections_of_bodies(rounds: tuple[bool, ...], drawn: str) -> None:
+    kinds = [
+        Kind(
+            shape="rod", bodies=1, bars=1, mass_kg=1.0, volume_m3=1.0, length_m=1.0, thickness_normal_m=1.0,
+            thickness_in_plane_m=1.0, round=one, sphere_diameter_m=1.0,
+        )
+        for one in rounds
+    ]  # fmt: skip
+    assert drawn_as(kinds or None) == drawn
 
 
 def test_reasons_of_effects_are_those_of_all_scenes() -> None:
