@@ -19,10 +19,9 @@ setup: ## install everything into the system and .venv (first time on a bare sys
 setup-mpi: setup ## install LAMMPS and Open MPI besides, for engine: lammps (a minute)
 	@setup/install.sh --mpi
 
-demo: setup ## quick comparison with Gravish et al. 2012, figures included (3 min)
-	$(BIN)/smarticles study gravish --quick --out out/demo-$(STAMP)
-	@echo "figures:"
-	@ls -1 $(CURDIR)/out/demo-$(STAMP)/results/*.png
+demo: setup ## one pile, three procedures: a picture, and a figure among published numbers (1 min)
+	$(BIN)/smarticles sweep studies/demo/sweep.yaml --out out/demo-$(STAMP) --submit local
+	$(BIN)/python -m studies.demo out/demo-$(STAMP)
 
 validate: setup ## the whole comparison with Gravish et al. 2012 (hours)
 	$(BIN)/smarticles study gravish --out out/validate-$(STAMP)

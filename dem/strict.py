@@ -4,6 +4,7 @@ import difflib
 import math
 import re
 from collections.abc import Mapping, Sequence
+from numbers import Integral, Real
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -23,6 +24,12 @@ _TAG_OF = {"particle": "shape", "joints": "law"}  # the one that a key needs; al
 _OF_A_KEY = "[key]"  # last step of pydantic's path if the key itself is wrong
 # A message that begins with a key is about that key, within the place that pydantic reports.
 _OWN_KEY = re.compile(r"\w[\w.]*(?=: )")
+SAME = 1e-9
+"""Ratio below which two numbers differ by rounding alone [-].
+
+Sums and products in double precision, such as 0.1 + 0.2, are off by some 1e-16; files state numbers that differ with
+fewer than nine digits."""
+
 _LONGEST_KEY = 60  # characters of a key that are shown
 _MOST_ERRORS = 3  # shown at once
 
@@ -145,6 +152,21 @@ def explained(error: ValidationError, data: Any, *, described: str) -> str:
     lines = [place + text for place, text in texts.items() if place not in filled or text not in reported]
     more = f" (and {len(lines) - _MOST_ERRORS} more)" if len(lines) > _MOST_ERRORS else ""
     return "; also ".join(lines[:_MOST_ERRORS]) + more
+
+
+def equal(one: Any, other: Any) -> bool:
+    """Return whether two values of files are equal: numbers to `SAME`, whole ones exactly; a boolean is no number."""
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(equal(value, other[key]) for key, value in one.items())
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return len(one) == len(other) and all(map(equal, one, other))
+    if isinstance(one, bool) or isinstance(other, bool):
+        return one is other
+    if isinstance(one, Integral) and isinstance(other, Integral):
+        return int(one) == int(other)
+    if isinstance(one, Real) and isinstance(other, Real):
+        return math.isclose(float(one), float(other), rel_tol=SAME)
+    return bool(one == other)
 
 
 def unit_of(key: str) -> tuple[str, str]:

@@ -58,8 +58,8 @@ StrictLoader.add_implicit_resolver("tag:yaml.org,2002:int", _INT, list("-+012345
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file, cut off one character beyond the length that `load_yaml` accepts."""
-    with path.open(encoding="utf-8") as file:
+    """Return the text of a UTF-8 file without its byte-order mark, cut off where `load_yaml` rejects its length."""
+    with path.open(encoding="utf-8-sig") as file:
         return file.read(LONGEST + 1)
 
 

@@ -4,22 +4,44 @@ import argparse
 import json
 import math
 import re
+import shutil
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from textwrap import fill, wrap
 from typing import Any, NoReturn, Self, TypeVar
 
 from dem.engine import ENGINES
 from dem.errors import InputError, nearest
+from dem.terminal import folded, screen_width, writes_unicode
+
+_WIDEST = 110  # characters of a line of help
 
 Handler = Callable[[argparse.Namespace], int]  #: Function that runs a subcommand and returns the exit status
+
+
+class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """Formatter that fits paragraphs of descriptions to the terminal; those with indented lines keep their lines."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, width=min(shutil.get_terminal_size().columns, _WIDEST) - 1)
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        paragraphs = text.split("\n\n")
+        return "\n\n".join(
+            folded(paragraph, width=shutil.get_terminal_size().columns)
+            if re.search(r"^ ", paragraph, re.MULTILINE)
+            else fill(paragraph, width, break_on_hyphens=False)
+            for paragraph in paragraphs
+        )
 
 
 class Parser(argparse.ArgumentParser):
     """Argument parser that raises InputError, which names the nearest known word, instead of exiting."""
 
     def __init__(self, **options: Any) -> None:
-        options.setdefault("formatter_class", argparse.RawDescriptionHelpFormatter)
+        options.setdefault("formatter_class", _HelpFormatter)
         super().__init__(allow_abbrev=False, **options)
 
     def error(self, message: str) -> NoReturn:
@@ -163,6 +185,9 @@ def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
 # -- output ------------------------------------------------------------------------------------------------------------
 
 
+_LEAST_TEXT = 24  # characters that a column of text must have on the screen to be broken into lines
+
+
 class Cell(str):
     """Formatted number in a table: a text that `columns` aligns to the right."""
 
@@ -174,23 +199,48 @@ class Cell(str):
         return cls(f"{factor * value:{form}}" if math.isfinite(value) else "-")
 
 
-def columns(header: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """Return a table with aligned columns, of unlimited width.
+def columns(header: Sequence[str], rows: Sequence[Sequence[object]], *, keys: int = 1) -> str:
+    """Return a table with aligned columns, which fits a terminal; elsewhere it has any width.
 
-    Columns of numbers are aligned to the right; NaN and None become dashes.
+    Columns of numbers are aligned to the right; NaN and None become dashes. Where the terminal is too narrow, the last
+    column is broken into lines if it has text, otherwise the table is divided into blocks, which repeat the first
+    `keys` columns.
     """
+    return "\n\n".join("\n".join(block) for block in column_blocks(header, rows, keys=keys))
+
+
+def column_blocks(header: Sequence[str], rows: Sequence[Sequence[object]], *, keys: int = 1) -> list[list[str]]:
+    """Return the lines of a table of `columns`, block by block: the header, then a text for each row."""
     cells = [[format_cell(value) for value in row] for row in rows]
     widths = [max(map(len, column)) for column in zip(header, *cells, strict=True)]
     numbers = [
         bool(rows) and all(isinstance(row[k], int | float | Cell | None) for row in rows) for k in range(len(header))
     ]
-    return "\n".join(
-        "  ".join(
-            cell.rjust(width) if number else cell.ljust(width)
-            for cell, width, number in zip(line, widths, numbers, strict=True)
-        ).rstrip()
-        for line in [list(header), *cells]
-    )
+    screen = screen_width()
+    before_last = sum(width + 2 for width in widths[:-1])
+    folds = screen is not None and not numbers[-1] and screen - before_last >= _LEAST_TEXT
+
+    def line(texts: Sequence[str], shown: Sequence[int]) -> str:
+        aligned = (texts[k].rjust(widths[k]) if numbers[k] else texts[k].ljust(widths[k]) for k in shown)
+        text = "  ".join(aligned).rstrip()
+        if not folds or screen is None or len(text) <= screen:
+            return text
+        lines = wrap(texts[-1], screen - before_last, break_on_hyphens=False)
+        return text[:before_last] + f"\n{' ' * before_last}".join(lines)
+
+    every = list(range(len(header)))
+    blocks = [every] if screen is None or folds else _blocks(widths, keys, screen)
+    return [[line(texts, shown) for texts in [list(header), *cells]] for shown in blocks]
+
+
+def _blocks(widths: Sequence[int], keys: int, screen: int) -> list[list[int]]:
+    """Divide columns of these widths into blocks that fit a screen; each begins with the first `keys` columns."""
+    blocks = [list(range(keys))]
+    for k in range(keys, len(widths)):
+        if len(blocks[-1]) > keys and sum(widths[j] + 2 for j in blocks[-1]) + widths[k] > screen:
+            blocks.append(list(range(keys)))
+        blocks[-1].append(k)
+    return blocks
 
 
 def format_cell(value: object) -> str:
@@ -201,8 +251,11 @@ def format_cell(value: object) -> str:
 
 
 def as_json(value: Any) -> str:
-    """Return indented JSON; NaN and infinite numbers become null, since JSON cannot represent them."""
-    return json.dumps(_finite(value), indent=2, ensure_ascii=False, default=str)
+    """Return indented JSON; NaN and infinite numbers become null, since JSON cannot represent them.
+
+    Characters that standard output cannot write become escapes of JSON.
+    """
+    return json.dumps(_finite(value), indent=2, ensure_ascii=not writes_unicode(sys.stdout), default=str)
 
 
 def _finite(value: Any) -> Any:

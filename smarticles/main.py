@@ -8,14 +8,14 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from dem.errors import InputError, RunError
 from dem.run.stop import release
-from dem.terminal import printable
+from dem.terminal import folded, printable, screen_width
 from smarticles.command_line import Commands, Parser, add_options
 from smarticles.commands import (
     accuracy,
@@ -56,11 +56,10 @@ measure, draw and compare run directories."""
 _EPILOG = """\
 first steps:
   smarticles doctor                        test the installation
-  smarticles study gravish --quick --out demo
-                                           pour, shake, measure, compare with Gravish (minutes)
   smarticles init                          write a small commented scene.yaml
   smarticles plan scene.yaml               print phases, effects, expected wall time
   smarticles run scene.yaml --out run1     compute
+  smarticles render run1                   draw the last frame
 
 completion of commands and options: add eval "$(smarticles --completion bash)" to ~/.bashrc; for zsh,
 write the output of --completion zsh to a file _smarticles in a folder of $fpath
@@ -137,7 +136,8 @@ def guarded(action: Callable[[], int], *, debug: bool = False) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return BROKEN_PIPE
     except KeyboardInterrupt as error:
-        _complain(f"stopped; {str(error) or 'all written files are complete'}", error, debug)
+        what = str(error) or "all written files are complete; repeat the command to go on"
+        _complain(f"stopped; {what}", error, debug)
         return STOPPED
     except Exception as error:  # reported as an internal error
         text, status = _explain(error)
@@ -176,9 +176,12 @@ def _explain(error: Exception) -> tuple[str, int]:
 
 
 def _complain(text: str, error: BaseException, debug: bool) -> None:
-    print(f"smarticles: {' '.join(text.split())}", file=sys.stderr)
-    if debug:
-        traceback.print_exception(error)
+    # A terminal that was closed cannot show the text.
+    with suppress(OSError):
+        line = f"smarticles: {' '.join(text.split())}"
+        print(folded(line, width=screen_width(sys.stderr), at="; "), file=sys.stderr)
+        if debug:
+            traceback.print_exception(error)
 
 
 def _stop(_number: int, _frame: FrameType | None) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
 from functools import partial
@@ -11,6 +11,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dem.display import Steps, silent
 from dem.errors import InputError, nearest
 from dem.record.names import FRAME, OF_SWEEP, VTKHDF, collection
 from smarticles.kept_tables import keep, key_of, read_kept
@@ -102,7 +103,7 @@ def measured(
     also: Sequence[str] = (),
     measures: Sequence[FrameMeasure] = (),
     jobs: int = 1,
-    progress: Callable[[int, int], None] = lambda _done, _runs: None,
+    progress: Steps = silent,
 ) -> pd.DataFrame:
     """Measure runs and sweeps; tables of runs that have not changed since are read from their directories.
 
@@ -115,8 +116,7 @@ def measured(
             there.
         jobs: number of processes. More than 1 needs `if __name__ == "__main__":` in the calling script, since the
             processes import it.
-        progress: function that is called after each measured run, with the number of runs measured so far and the
-            number of runs to measure.
+        progress: function that is called after each measured run.
 
     Returns:
         One table of all runs, with units in the column names. The variables of a sweep follow the first column, `run`;
@@ -142,7 +142,7 @@ def measured(
         made = each(take, missing, [keys[directory] for directory in missing])
         for number, (directory, table) in enumerate(zip(missing, made, strict=True), start=1):
             tables[directory] = table
-            progress(number, len(missing))
+            progress("runs measured", number, len(missing))
     return pd.concat(
         [_with_variables(table, found[run]) for run, table in tables.items() if table is not None], ignore_index=True
     )
@@ -219,13 +219,13 @@ def grouped(
     Returns:
         The table of `means_by`. Its column `state` counts the finished runs of a group, such as "3 of 12 finished".
     """
-    from postprocess.statistics.points import RUNS, means_by  # noqa: PLC0415
+    from postprocess.statistics.points import RUNS, means_by, together  # noqa: PLC0415
 
     for name in by:
         if name not in table.columns:
             known = [str(column) for column in table.columns if not str(column).endswith("]")]
             raise InputError(f"the tables of these runs have no column {name!r}; {nearest(name, known)}")
-    keys = [*by, *(name for name in PHASE if name not in by)]
+    keys, table = [*by, *(name for name in PHASE if name not in by)], together(table, by)
     averaged = table if unfinished else table[table[STATE] == DONE]
     # Groups without a finished run keep their row.
     means = table[keys].drop_duplicates(ignore_index=True)
@@ -250,12 +250,14 @@ def group_columns(means: pd.DataFrame, by: Sequence[str]) -> list[str]:
 
 def _finished(means: pd.DataFrame, table: pd.DataFrame, by: Sequence[str], runs: pd.DataFrame | None) -> Sequence[str]:
     """Return, for each row of `means`, how many runs of its group are finished, such as "3 of 12 finished"."""
+    from dem.strict import equal  # noqa: PLC0415  (pydantic)
+
     named = [name for name in by if name not in PHASE]
     counted = runs if runs is not None and set(named) <= set(runs.columns) else table.drop_duplicates(["run", *named])
     texts = []
     for values in means[named].to_dict("records"):
         of_group = counted
         for name, value in values.items():
-            of_group = of_group[of_group[name] == value]
+            of_group = of_group[[equal(one, value) for one in of_group[name]]]
         texts.append(f"{(of_group[STATE] == DONE).sum()} of {len(of_group)} finished")
     return texts

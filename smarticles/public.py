@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 import shlex
+import signal
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,9 +17,11 @@ from typing import TYPE_CHECKING, Any, overload
 import pandas as pd
 import yaml
 
+from dem.display import Display
 from dem.errors import InputError, RunError
 from dem.record.frame import Frame
 from dem.record.names import SCENE
+from dem.record.progress import row_of
 from dem.record.run import Run, open_run
 from dem.scene.reading import SCHEMA_VERSION, dump_scene
 from dem.scene.scene import Scene
@@ -50,6 +53,9 @@ _IN_PYTHON = (
     (r"smarticles-\w+/sweep\.yaml", "vary"),
     (r"smarticles-\w+/scene\.yaml(\.j2)?", "scene"),
 )
+
+
+_POLL_S = 0.25  # between two readings of the progress of a run
 
 
 @dataclass(frozen=True)
@@ -120,7 +126,13 @@ class SweepDirectory(Sequence[Run]):
 
 
 def run(
-    scene: Scene | Path | str, out: Path | str, *, threads: int = 1, ranks: int | None = None, resume: bool = False
+    scene: Scene | Path | str,
+    out: Path | str,
+    *,
+    threads: int = 1,
+    ranks: int | None = None,
+    resume: bool = False,
+    progress: bool = True,
 ) -> Run:
     """Run a scene in a new process, as `smarticles run` does, and return the finished run.
 
@@ -132,10 +144,12 @@ def run(
         threads: number of threads of YADE. Results are reproducible bit by bit with one thread only.
         ranks: number of MPI processes of LAMMPS; None: 1, or with `resume` the number at the start.
         resume: continue an unfinished run from its last checkpoint.
+        progress: show a bar on the terminal or in the notebook; elsewhere a line every 30 s.
 
     Raises:
         InputError: the scene is not valid, or `out` contains other files.
         RunError: the run failed or was stopped.
+        KeyboardInterrupt: Ctrl-C stopped the run; all its files are complete.
     """
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch, _in_words_of_python(scratch):
         file = Path(scratch, "scene.yaml") if isinstance(scene, Scene) else Path(scene)
@@ -146,14 +160,40 @@ def run(
         if isinstance(scene, Scene):
             # The file in the temporary folder will not exist; `scene.yaml` in the run directory will.
             words += ["--recorded-as", shlex.join(["smarticles", "run", str(Path(out) / SCENE), "--out", "NEW"])]
-        done = subprocess.run(
-            words, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, check=False
-        )
-        if done.returncode:
-            lines = done.stderr.strip().splitlines() or [f"exit status {done.returncode}, without a message"]
+        with Path(scratch, "said").open("w+", encoding="utf-8") as said:
+            # In a session of its own: Ctrl-C reaches this process alone, which signals the run once.
+            process = subprocess.Popen(
+                words, env=environment(), stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
+            )
+            status = _wait(process, Path(out), progress=progress)
+            said.seek(0)
+            lines = [line for line in said.read().splitlines() if line.startswith("smarticles: ")]
+        if status:
+            lines = lines or [f"exit status {status}, without a message"]
             text = lines[-1].removeprefix("smarticles: ").removeprefix("error: ")
-            raise InputError(text) if done.returncode == BAD_INPUT else RunError(text)
+            raise InputError(text) if status == BAD_INPUT else RunError(text)
     return Run(Path(out))
+
+
+def _wait(process: subprocess.Popen[bytes], out: Path, *, progress: bool) -> int:
+    """Wait for the process of a run and return its exit status; show the progress in the run directory `out`.
+
+    After Ctrl-C, the run closes its files before KeyboardInterrupt is raised; Ctrl-C again kills it.
+    """
+    with Display() if progress else nullcontext() as display:
+        try:
+            while True:
+                if display is not None:
+                    display.update(row_of(Run(out).progress))
+                with suppress(subprocess.TimeoutExpired):
+                    return process.wait(_POLL_S)
+        except KeyboardInterrupt:
+            process.send_signal(signal.SIGINT)
+            process.wait()
+            raise KeyboardInterrupt(f"{out}: stopped; go on with smarticles.run(…, resume=True)") from None
+        finally:
+            if process.poll() is None:
+                process.kill()
 
 
 def read(directory: Path | str) -> Run:

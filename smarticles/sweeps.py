@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 import platform
 import shlex
-import sys
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from dem.display import Display
 from dem.errors import InputError, RunError
-from dem.terminal import bare
 from smarticles.command_line import Parser, add_options, positive_int
 
 if TYPE_CHECKING:
@@ -85,14 +84,12 @@ def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
 
     After Ctrl-C, the KeyboardInterrupt names `command`, which continues the sweep.
     """
-    from rich.console import Console  # noqa: PLC0415
-
-    from templates.local import Display, run_folder  # noqa: PLC0415
+    from templates.local import SweepDisplay, run_folder  # noqa: PLC0415
     from templates.slurm.submission import reject_queued  # noqa: PLC0415
 
     reject_queued(folder)
     try:
-        return run_folder(folder, Display(Console(file=bare(sys.stderr))), slots=jobs)
+        return run_folder(folder, SweepDisplay(Display()), slots=jobs)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"finished runs are kept; continue with: {command}") from None
 

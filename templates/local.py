@@ -11,22 +11,17 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Self
 
-from rich.console import Console, Group
-from rich.live import Live
-from rich.progress_bar import ProgressBar
-from rich.table import Table
-from rich.text import Text
-
+from dem.display import Display, Row, duration
 from dem.engine.cores import usable_cores
 from dem.record.document import Progress
+from dem.record.progress import row_of
 from dem.record.run import Run
-from dem.terminal import escaped
 from templates.sweep.folder import Entry, Folder
 
 RunCommand = Callable[[Path, Path, bool], Sequence[str]]
@@ -67,76 +62,46 @@ class Snapshot:
     running: tuple[tuple[str, float, Progress], ...]  #: Name, wall time [s] and progress of each running run
     left_s: float  #: Expected wall time left [s]
 
-    def __str__(self) -> str:
-        failed = f", {self.failed} failed" if self.failed else ""
-        return f"{self.ended} of {self.total} runs ended{failed}, time left {duration(self.left_s)}"
-
     @property
-    def rows(self) -> list[tuple[str, ...]]:
-        """Name, phase, simulated time, packing fraction and wall time of each running run, as text."""
-        rows: list[tuple[str, ...]] = []
-        for name, wall, progress in self.running:
-            end = " s" if progress.end_s is None else f" of {progress.end_s:.2f} s"
-            simulated = "starting" if progress.time_s is None else f"{progress.time_s:.2f}{end}"
-            phi = "" if progress.phi is None else f"φ {progress.phi:.3f}"
-            rows.append((name, progress.phase or "", simulated, phi, duration(wall)))
-        return rows
+    def rows(self) -> list[Row]:
+        """Rows of a display: one for each running run, one for all runs."""
+        failed = f", {self.failed} failed" if self.failed else ""
+        ended = f"{self.ended} of {self.total} runs ended{failed}"
+        share = self.ended / self.total if self.total else 1.0
+        running = [row_of(progress, label=name) for name, _, progress in self.running]
+        return [*running, Row(label=ended, fraction=share, left_s=self.left_s)]
 
 
-def duration(seconds: float) -> str:
-    """Return a time [s] as text `3:05` or `2:03:05`."""
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+class SweepDisplay:
+    """Shows the progress of a sweep: each running run and the sweep, and what became of the runs that ended."""
 
-
-class Display:
-    """Shows the progress of a sweep: at a terminal a redrawn table, else a line every `interval_s` [s]."""
-
-    def __init__(self, console: Console, interval_s: float = 30.0) -> None:
-        self._console = console
-        self._live = Live(console=console, refresh_per_second=4, transient=True) if console.is_terminal else None
-        self._interval_s = interval_s
-        self._last = time.monotonic()
+    def __init__(self, display: Display) -> None:
+        """Show on a display, which the context of this object opens."""
+        self._display = display
 
     def __enter__(self) -> Self:
-        if self._live:
-            self._live.start()
+        self._display.__enter__()
         return self
 
     def __exit__(self, *exception: object) -> None:
-        if self._live:
-            self._live.stop()
+        self._display.__exit__(*exception)
 
     def started(self, name: str) -> None:
         """Report that a run was started."""
-        if not self._live:
-            self._print(f"{name} started")
+        if not self._display.redraws:
+            self._display.print(f"{name} started")
 
     def ended(self, outcome: Outcome) -> None:
         """Report the outcome of a run."""
-        self._print(f"{_MARKS[outcome.status]} {outcome}" if self._live else str(outcome))
+        self._display.print(f"{_MARKS[outcome.status]} {outcome}" if self._display.redraws else str(outcome))
 
     def update(self, snapshot: Snapshot) -> None:
         """Show the state of all runs."""
-        if self._live:
-            table, total = Table.grid(padding=(0, 2)), Table.grid(padding=(0, 2))
-            for row in snapshot.rows:
-                table.add_row(*(Text(escaped(cell)) for cell in row))
-            total.add_row(ProgressBar(max(snapshot.total, 1), snapshot.ended, width=30), str(snapshot))
-            self._live.update(Group(table, total))
-        elif time.monotonic() - self._last >= self._interval_s:
-            self._last = time.monotonic()
-            runs = ", ".join(" ".join(filter(None, row[:-1])) for row in snapshot.rows)
-            self._print(f"{snapshot}; {runs}")
+        self._display.update(*snapshot.rows)
 
     def stopping(self, count: int) -> None:
         """Report that `count` runs were signalled to stop."""
-        self._print(f"stopping {count} runs, which close their files; Ctrl-C again does not wait")
-
-    def _print(self, line: str) -> None:
-        # A run's name may contain brackets, which rich would take for markup.
-        self._console.print(escaped(line), markup=False, highlight=False, soft_wrap=True)
+        self._display.print(f"stopping {count} runs, which close their files; Ctrl-C again does not wait")
 
 
 def smarticles_command(scene: Path, directory: Path, resume: bool) -> tuple[str, ...]:
@@ -162,7 +127,7 @@ def environment() -> dict[str, str]:
 
 def run_folder(
     folder: Folder,
-    display: Display,
+    display: SweepDisplay,
     *,
     slots: int | None = None,
     command: RunCommand = smarticles_command,
@@ -185,7 +150,7 @@ def run_folder(
 @dataclass
 class _Runner:
     folder: Folder
-    display: Display
+    display: SweepDisplay
     command: RunCommand
     slots: int
     poll_s: float
@@ -193,6 +158,7 @@ class _Runner:
     lock: int
     outcomes: dict[str, Outcome] = field(default_factory=dict)
     active: dict[str, tuple[subprocess.Popen[bytes], float]] = field(default_factory=dict)
+    latest: dict[str, Progress] = field(default_factory=dict)
     stopping: bool = False
     guard: threading.Lock = field(default_factory=threading.Lock)
 
@@ -285,33 +251,52 @@ class _Runner:
         self._collect(waiting, 0.0)
 
     def _snapshot(self) -> Snapshot:
-        running = {name: time.monotonic() - began for name, (_, began) in list(self.active.items())}
+        now = time.monotonic()
+        running = tuple((name, now - began, self._progress(name)) for name, (_, began) in list(self.active.items()))
+        expected = {entry.name: entry.expected_s for entry in self.folder.entries}
         return Snapshot(
             total=len(self.folder.entries),
             ended=len(self.outcomes),
             failed=sum(outcome.missing for outcome in self.outcomes.values()),
-            running=tuple(
-                (name, wall, Run(self.folder.path / "runs" / name).progress) for name, wall in running.items()
-            ),
-            left_s=self._left(running),
+            running=running,
+            left_s=time_left(expected, self.outcomes, running, slots=self.slots),
         )
 
-    def _left(self, running: dict[str, float]) -> float:
-        """Return the expected wall time left [s].
+    def _progress(self, name: str) -> Progress:
+        """Return the latest known progress of a run, which has no file of it any more when it is about to end."""
+        progress = Run(self.folder.path / "runs" / name).progress
+        if progress.time_s is not None:
+            self.latest[name] = progress
+        return self.latest.get(name, progress)
 
-        Expected times of runs are corrected by the ratio of true to expected time of the finished runs. `running` has
-        the wall times so far [s] of the running ones by name.
-        """
-        expected = {entry.name: entry.expected_s for entry in self.folder.entries}
-        done = [outcome for outcome in self.outcomes.values() if outcome.status == "done"]
-        planned = sum(expected[outcome.name] for outcome in done)
-        pace = sum(outcome.wall_s for outcome in done) / planned if planned > 0 else 1.0
-        left = [
-            max(pace * wall - running.get(name, 0.0), 0.0)
-            for name, wall in expected.items()
-            if name not in self.outcomes
-        ]
-        return max(sum(left) / self.slots, *left, 0.0)
+
+def time_left(
+    expected: Mapping[str, float],
+    outcomes: Mapping[str, Outcome],
+    running: Sequence[tuple[str, float, Progress]],
+    *,
+    slots: int,
+) -> float:
+    """Return the expected wall time [s] until all runs have ended.
+
+    Runs estimate their own time left once they have begun. Expected times of the others are corrected by the ratio of
+    true to expected time of the finished runs, or of the running ones if none has finished.
+
+    Args:
+        expected: expected wall time of each run [s], by name.
+        outcomes: outcomes of the runs that have ended, by name.
+        running: name, wall time so far [s] and progress of each running run.
+        slots: number of runs that are computed at once.
+    """
+    spent = [(o.wall_s, expected[o.name]) for o in outcomes.values() if o.status == "done"] or [
+        (wall + progress.left_s, expected[name]) for name, wall, progress in running if progress.left_s is not None
+    ]
+    planned = sum(plan for _, plan in spent)
+    pace = sum(wall for wall, _ in spent) / planned if planned > 0 else 1.0
+    left = {name: pace * plan for name, plan in expected.items() if name not in outcomes}
+    for name, wall, progress in running:
+        left[name] = max(left.get(name, 0.0) - wall, 0.0) if progress.left_s is None else progress.left_s
+    return max(sum(left.values()) / slots, *left.values(), 0.0)
 
 
 def _cause(log: Path, returncode: int) -> str:

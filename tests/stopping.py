@@ -34,13 +34,13 @@ def run_until(scene: Scene, out: Path, when: float) -> None:
     """Run a scene until its first checkpoint after a time [s], at which the run must stop."""
     builders = Builders(engine=lambda scene, dt: Interrupted(build_engine(scene, dt), when))  # type: ignore[arg-type, return-value]
     with pytest.raises(StopRequestedError):
-        run_scene(scene, out, command="", progress=False, builders=builders)
+        run_scene(scene, out, command="", builders=builders)
 
 
 def assert_goes_on(scene: Scene, whole: Run, out: Path, when: float) -> None:
     """Stop a run of a scene at a time [s], resume it, and compare frames and series with a whole run, bit by bit."""
     run_until(scene, out, when)
-    run_scene(scene, out, command="", progress=False, resume=True)
+    run_scene(scene, out, command="", resume=True)
     assert_equal_frames(whole, Run(out))
     for name, values in Run(out).series.items():
         np.testing.assert_array_equal(values, whole.series[name], err_msg=name)

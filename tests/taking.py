@@ -26,7 +26,7 @@ POUR: dict[str, Any] = {
 def pour(engine: str, out: str, fidelity: Any = ROUND) -> None:
     """A pile at rest, as a run."""
     scene = parse_scene({**POUR, "engine": engine, "fidelity": fidelity}, source="pour")
-    run_scene(scene, Path(out), command="test", progress=False)
+    run_scene(scene, Path(out), command="test")
 
 
 def taken_over(engine: str, source: str, fidelity: Any = ROUND) -> dict[str, Any]:

@@ -161,7 +161,7 @@ def watched(data: dict[str, Any], out: Path | str, *, dt: float | None = None) -
     scene = scene_of(data)
     Path(out).mkdir(parents=True, exist_ok=True)
     engine = engine_kind(scene.engine).build(scene, time_step(scene) if dt is None else dt)
-    progress = ProgressWriter(Path(out), scene.count, show=False)
+    progress = ProgressWriter(Path(out), scene.count)
     return scene, engine, build_recorder(scene, Path(out), progress)
 
 

@@ -13,6 +13,13 @@ class Column(NamedTuple):
     label: str  #: Name in tables, without the unit
     description: str
 
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the components of a vector, which the description states; one empty name for a number."""
+        return next((names for text, names in _COMPONENTS.items() if text in self.description), ("",))
+
+
+_COMPONENTS = {"(x, y, z)": ("x", "y", "z"), "barb 1 and barb 2": ("barb 1", "barb 2")}
 
 Columns = Mapping[str, Column]  #: Datasets by name, in the order of the file
 

@@ -201,9 +201,14 @@ class Progress(Document):
     """Progress of a running run, the content of `progress.json`, which is rewritten every second."""
 
     phase: str | None = None  #: Type of the current phase
+    index: int | None = None  #: Number of the current phase, from 0
+    phases: int | None = None  #: Number of phases of the run
     time_s: float | None = None  #: Simulated time
     end_s: float | None = None  #: Simulated time at which the current phase ends; None: unknown
     phi: float | None = None  #: Packing fraction [1]
     count: int | None = None  #: Number of smarticles added so far
+    total: int | None = None  #: Number of smarticles of the scene
+    fraction: float | None = None  #: Share of the run's expected work that is done [1]
+    left_s: float | None = None  #: Expected wall time left
     wall_s: float | None = None  #: Wall time of the process
     checkpoint_s: float | None = None  #: Simulated time of the newest checkpoint

@@ -1,14 +1,20 @@
 """Write files that appear complete or not at all, and report files that cannot be read."""
 
+from __future__ import annotations
+
 import contextlib
 import os
+import warnings
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from dem.errors import InputError, RunError
 from dem.record.names import partial
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 GONE = "is gone; put it back and continue with `smarticles resume`, or start the run anew"
 _CHOOSE = "or choose another --out; everything written before is whole"
@@ -76,6 +82,24 @@ def reject_inflated(archive: zipfile.ZipFile | None, most: int) -> None:
     total = sum(member.file_size for member in archive.infolist()) if archive else 0
     if total > most:
         raise ValueError(f"it would unpack to {total} bytes, at most {most} are possible")
+
+
+def read_csv(what: str, path: Path, remedy: str, **options: Any) -> pd.DataFrame:
+    """Return a CSV file as a table, by `pandas.read_csv` with its options; see `cannot_read` for `what` and `remedy`.
+
+    InputError if it cannot be read, or rows have more cells than the header has names: pandas would take the first
+    cells for an index, and all columns would be those of their neighbours.
+    """
+    import pandas as pd  # noqa: PLC0415  (slow to import, and no run needs it)
+
+    with warnings.catch_warnings(action="error", category=pd.errors.ParserWarning):
+        try:
+            return pd.read_csv(path, index_col=False, **options)
+        except pd.errors.ParserWarning:
+            cause = "rows have more cells than the first line has names"
+            cannot_read(what, path, cause, "name each column, or take out the other cells")
+        except (OSError, ValueError) as error:
+            cannot_read(what, path, error, remedy)
 
 
 def cannot_read(what: str, path: Path, cause: BaseException | str, remedy: str) -> NoReturn:

@@ -1,17 +1,87 @@
-"""Progress of a running simulation, in `progress.json` and in one line on the terminal."""
+"""Progress of a running simulation, in `progress.json` and on a display."""
 
 import math
-import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
 
+from dem.display import Display, Row
 from dem.errors import RunError
 from dem.record.document import Progress
 from dem.record.names import PROGRESS
-from dem.terminal import ERASE_LINE, redraw, warn
+from dem.terminal import warn
 
 INTERVAL = 1.0  # s of wall time between updates
+LATE = 0.8  # share of a phase of unknown length from which on its progress slows down
+TRUST_S, TRUST_SHARE = 0.5, 0.1  # time [s] and share of the run for which the plan counts as measured
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseCost:
+    """What a phase is expected to cost."""
+
+    simulated_s: float  #: Expected simulated time
+    wall_s: float  #: Expected wall time
+    known: bool  #: Whether the simulated time is exact
+    grows: bool = False  #: Whether bodies are added at a constant rate, so that the cost grows with the square of time
+
+    def share(self, time: float) -> float:
+        """Return the expected share [1] of the phase's work that is done at a time since its beginning [s]."""
+        share = time / self.simulated_s if self.simulated_s > 0 else 1.0
+        if self.known:
+            return min(share, 1.0)
+        if share > LATE:  # it may last longer than expected
+            share = 1 - (1 - LATE) * math.exp(-(share - LATE) / (1 - LATE))
+        return share**2 if self.grows else share
+
+
+@dataclass
+class Estimate:
+    """Estimate of the wall time left, from the planned cost and the time spent so far."""
+
+    phases: Sequence[PhaseCost]  #: Expected cost of all phases of the run
+    _start: tuple[float, float] | None = None  #: Wall time [s] and work done [s] when counting began
+
+    def done(self, phase: int, time: float) -> float:
+        """Return the share [1] of the run's work that is done at a time since the beginning of a phase [s]."""
+        total = sum(cost.wall_s for cost in self.phases)
+        return self._work(phase, time) / total if total > 0 else 0.0
+
+    def left_s(self, phase: int, time: float, wall: float) -> float:
+        """Return the expected wall time left [s], at a time since the beginning of a phase and a wall time [s].
+
+        The planned cost is multiplied by the ratio of measured to planned time of the work so far. The plan counts as
+        a short measurement: without it, the first fractions of a second would decide.
+        """
+        work, total = self._work(phase, time), sum(cost.wall_s for cost in self.phases)
+        if self._start is None:
+            self._start = wall, work
+        trust = TRUST_S + TRUST_SHARE * total
+        pace = (wall - self._start[0] + trust) / (work - self._start[1] + trust)
+        return pace * (total - work)
+
+    def _work(self, phase: int, time: float) -> float:
+        current = self.phases[phase]
+        return sum(cost.wall_s for cost in self.phases[:phase]) + current.share(time) * current.wall_s
+
+
+def row_of(progress: Progress, *, label: str = "") -> Row:
+    """Return the row of a display that shows the progress of a run.
+
+    Without a label it begins with the phase; with one, as in a sweep, it is shorter.
+    """
+    phase = progress.phase or "starting"
+    if progress.phases is not None and progress.index is not None:
+        phase += f" ({progress.index + 1} of {progress.phases})"
+    parts = [phase] if label else []
+    if progress.time_s is not None:
+        parts.append(f"t = {progress.time_s:.2f} s")
+    if not label and progress.phase == "deposit" and progress.total is not None:
+        parts.append(f"{progress.count} of {progress.total} poured")
+    elif not label and progress.phi is not None:
+        parts.append(f"φ {progress.phi:.3f}")
+    return Row(label=label or phase, fraction=progress.fraction, detail="  ".join(parts), left_s=progress.left_s)
 
 
 @dataclass
@@ -19,27 +89,27 @@ class ProgressWriter:
     """Writer of a run's progress, at most once per second."""
 
     folder: Path  #: The run directory
-    total: int  #: Number of smarticles in the scene
-    show: bool  #: Whether to draw a progress line on the terminal
+    total: int  #: Number of bodies in the scene
+    costs: Sequence[PhaseCost] = ()  #: Expected cost of the phases; empty: the time left is unknown
+    display: Display | None = None  #: Shows the progress
     _progress: Progress = field(default_factory=Progress)
     _begun: float = field(init=False)
     _start: float = 0.0
-    _resumed: tuple[float, float] = (0.0, 0.0)  # wall time and simulated time at the beginning or the resumption [s]
     _last: float = -math.inf
 
     def __post_init__(self) -> None:
         self._begun = monotonic()
+        self._estimate = Estimate(self.costs) if self.costs else None
 
-    def begin(self, *, phase: str, start: float, time: float, end: float | None) -> None:
-        """Begin or resume a phase at a simulated time [s]; its end is None if it is unknown."""
-        self._progress = self._progress.model_copy(update={"phase": phase, "end_s": end})
+    def begin(self, *, phase: str, index: int, start: float, end: float | None) -> None:
+        """Begin or resume a phase, which began at the simulated time `start` [s]; its end is None if it is unknown."""
+        counts = {"index": index, "phases": len(self.costs) or None, "total": self.total}
+        self._progress = self._progress.model_copy(update={"phase": phase, "end_s": end, **counts})
         self._start = start
-        self._resumed = (monotonic(), time)
         self._last = -math.inf
 
     def warn(self, message: str) -> None:
         """Print a warning to standard error."""
-        self._erase()
         warn(message)
 
     def checkpointed(self, time: float) -> None:
@@ -50,48 +120,28 @@ class ProgressWriter:
             self.update(time=time, phi=math.nan if progress.phi is None else progress.phi, count=progress.count)
 
     def update(self, *, time: float, phi: float, count: int) -> None:
-        """Write simulated time [s], packing fraction [1] and number of smarticles, at most once per second."""
-        wall, known_phi = monotonic(), phi if math.isfinite(phi) else None
-        update = {"time_s": time, "phi": known_phi, "count": count, "wall_s": wall - self._begun}
+        """Write simulated time [s], packing fraction [1] and number of bodies, at most once per second."""
+        now, known_phi = monotonic(), phi if math.isfinite(phi) else None
+        update = {"time_s": time, "phi": known_phi, "count": count, "wall_s": now - self._begun}
         self._progress = self._progress.model_copy(update=update)
-        if wall - self._last < INTERVAL:
+        if now - self._last < INTERVAL:
             return
-        self._last = wall
+        self._last = now
+        index = self._progress.index
+        if self._estimate is not None and index is not None:  # the first sample comes before the first phase
+            since = max(0.0, time - self._start)
+            shares = self._estimate.done(index, since), self._estimate.left_s(index, since, now)
+            self._progress = self._progress.model_copy(update=dict(zip(("fraction", "left_s"), shares, strict=True)))
         try:
             if self.folder.is_dir():  # a folder that was removed is not made again
                 self._progress.write(self.folder / PROGRESS)
         except RunError:
             # A full disk stops the run where results are written, not here.
             return
-        if self.show and self._progress.phase is not None:  # the first record comes before the first phase
-            self._draw(time, count, wall)
+        if self.display is not None:
+            self.display.update(row_of(self._progress))
 
     def finish(self, *, remove: bool = True) -> None:
-        """Remove `progress.json` if `remove`, and clear the line on the terminal."""
+        """Remove `progress.json` if `remove`."""
         if remove:
             (self.folder / PROGRESS).unlink(missing_ok=True)
-        self._erase()
-        sys.stderr.flush()
-
-    def _erase(self) -> None:
-        if self.show:
-            sys.stderr.write(ERASE_LINE)
-
-    def _draw(self, time: float, count: int, wall: float) -> None:
-        (wall_resumed, resumed), progress = self._resumed, self._progress
-        phase, end, phi = progress.phase, progress.end_s, progress.phi
-        done, left = "", ""
-        if end is not None and time > resumed:
-            fraction = (time - self._start) / (end - self._start)
-            bar = "█" * round(20 * fraction)
-            done = f" {bar:<20} {100 * fraction:3.0f} %"
-            ahead = max(0.0, end - time)
-            left = f"  {(wall - wall_resumed) * ahead / (time - resumed):.0f} s left in this phase"
-        elif phase == "deposit":
-            fraction = count / self.total
-            done = f" {'█' * round(20 * fraction):<20} {count}/{self.total}"
-            if 0 < fraction < 1:
-                # The pile grows, and each layer costs as much as the pile below it: time grows with the square of N.
-                left = f"  about {(wall - wall_resumed) * (1 / fraction**2 - 1):.0f} s left in this phase"
-        packing = f"  φ {phi:.3f}" if phi is not None else ""
-        redraw(f"{phase:<8}{done}  t = {time:.2f} s{packing}{left}")

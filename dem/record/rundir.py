@@ -50,7 +50,7 @@ def claimed(out: Path, *, resume: bool) -> Iterator[Claim]:
 
     The operating system holds the lock and releases it with the end of the process, so that it is never stale.
     With `resume` the directory must hold a run, otherwise it must be new or empty. InputError if not, if it cannot be
-    written, or if another process writes into it.
+    written, if another process writes into it, or if its file system has no locks.
     """
     _check_content(out, resume=resume)
     try:
@@ -59,18 +59,34 @@ def claimed(out: Path, *, resume: bool) -> Iterator[Claim]:
         msg = f"--out {out}: cannot be written ({error.strerror}); choose another directory, or allow it"
         raise InputError(msg) from None
     with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        if not acquired(lock, f"--out {out}"):
             lock.seek(0)
             msg = f"--out {out}: process {lock.read().strip() or 'unknown'} is running it; wait for it or stop it"
-            raise InputError(msg) from None
+            raise InputError(msg)
         # Checked again, since another process may have finished a run in the directory before the lock was free.
         _check_content(out, resume=resume)
         lock.truncate(0)
         lock.write(f"{os.getpid()}\n")
         lock.flush()
         yield Claim(out, lock)
+
+
+def acquired(lock: TextIO, where: str) -> bool:
+    """Lock an open file, and return whether that was possible: false if another process holds the lock.
+
+    InputError, which begins with the place `where`, if the file system has no locks.
+    """
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except (BlockingIOError, PermissionError):  # the latter on network file systems
+        return False
+    except OSError as error:
+        raise InputError(
+            f"{where}: its file system cannot lock files ({error.strerror}), so that nothing would keep two processes "
+            "from writing there at once; choose a directory on another file system, such as a local disk, or let the "
+            "administrator mount this one with locks (Lustre: option flock; NFS: lock service)"
+        ) from None
+    return True
 
 
 def _check_content(out: Path, *, resume: bool) -> None:

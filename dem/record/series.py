@@ -157,7 +157,8 @@ def read_series(directory: Path | str) -> Series:
         cannot_read("series", path, "no such file", _REMEDY)
     cause: Exception | str | None
     try:
-        with h5py.File(path, "r") as file:
+        # HDF5 refuses a name that this or another process has open in another way, and file systems without locks.
+        with path.open("rb") as stored, h5py.File(stored, "r") as file:
             if not (cause := _foreign(file)):
                 attributes = dict(file.attrs)
                 data = {name: frozen(np.atleast_1d(file[name][()])) for name in file}

@@ -227,12 +227,10 @@ def _reject(path: Path, what: str, error: Exception) -> NoReturn:
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    if journal_of(path).exists():
-        with Journaled(path) as stored, h5py.File(stored, "r") as file:
-            yield file
-    else:  # faster
-        with h5py.File(path, "r", locking=False) as file:
-            yield file
+    # HDF5 refuses a name that this or another process has open in another way, or that a killed one had open.
+    found = Journaled(path) if journal_of(path).exists() else path.open("rb", buffering=0)
+    with found as stored, h5py.File(stored, "r") as file:
+        yield file
 
 
 def _stamp(path: Path) -> tuple[float, ...]:

@@ -15,14 +15,15 @@ import meshio
 import numpy as np
 
 from dem.body.kinds import Mixture
+from dem.display import Display
 from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
-from dem.plan.outlook import warnings_of
+from dem.plan.outlook import planned_phases, warnings_of
 from dem.record.checkpoint import Checkpoint, has_checkpoint, read_checkpoint
 from dem.record.document import Done, Ended, Failed, Kind, Manifest, Phase
 from dem.record.files import write_text
 from dem.record.names import DONE, FAILED, MANIFEST, SCENE, VTKHDF
-from dem.record.progress import ProgressWriter
+from dem.record.progress import PhaseCost, ProgressWriter
 from dem.record.run import Run
 from dem.record.rundir import Claim, claimed, log_of
 from dem.record.vtkhdf import check_times
@@ -38,7 +39,7 @@ def run_scene(
     out: Path,
     *,
     command: str,
-    progress: bool,
+    display: Display | None = None,
     resume: bool = False,
     builders: Builders | None = None,
     stop: StopRequest | None = None,
@@ -49,7 +50,7 @@ def run_scene(
         out: the run directory; without `resume` it must be new or empty, with `resume` it must hold a run of this
             scene.
         command: command line that started the run, for the manifest.
-        progress: whether to draw a progress line on the terminal.
+        display: shows the progress of the run; None: nothing does.
         resume: whether to continue from the newest undamaged checkpoint, or from the start if none was written.
         builders: functions that make the parts of the run; None: default functions.
         stop: `StopRequest` of a caller that has listened for SIGUSR1 already; if it has come, the run stops before
@@ -84,7 +85,7 @@ def run_scene(
             write_text(out / SCENE, dump_scene(scene, out))
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
-            bar = ProgressWriter(out, scene.count, show=progress)
+            bar = ProgressWriter(out, scene.count, costs=_costs(scene), display=display)
             simulation: Simulation | None = None
             try:
                 simulation = Simulation(
@@ -113,6 +114,19 @@ def run_scene(
                 raise
             finally:
                 bar.finish(remove=claim.held)
+
+
+def _costs(scene: Scene) -> tuple[PhaseCost, ...]:
+    """Return what the phases of a scene are expected to cost."""
+    return tuple(
+        PhaseCost(
+            simulated_s=planned.estimate_s,
+            wall_s=planned.wall_s,
+            known=planned.duration_s is not None,
+            grows=phase.pours,
+        )
+        for planned, phase in zip(planned_phases(scene), scene.phases, strict=True)
+    )
 
 
 def _check_ready(scene: Scene) -> None:

@@ -85,8 +85,8 @@ class Simulation:
         duration = phase.known_duration
         self.recorder.progress.begin(
             phase=phase.type,
+            index=self._phase,
             start=entry["start_s"],
-            time=self.engine.time,
             end=entry["start_s"] + duration if duration else None,
         )
         self._advance()

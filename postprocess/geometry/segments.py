@@ -87,7 +87,7 @@ def curves(segments: ArrayLike, body: ArrayLike) -> tuple[Curve, ...]:
         InputError: See `checked_segments`.
     """
     segments, body = checked_segments(segments, body)
-    ends = _corner_numbers(segments)
+    ends = corner_numbers(segments)
     sorted_ = np.argsort(body, kind="stable")
     bodies, first = np.unique(body[sorted_], return_index=True)
     found = []
@@ -143,7 +143,7 @@ def inner_axes(segments: Floats, radius: Floats) -> Floats:
     An end is free if no other segment meets it. A sphere of that radius whose centre moves along the result ends at the
     tips of the body; engines place their spheres in the same way. No end moves beyond the middle of its segment.
     """
-    corners = _corner_numbers(segments)
+    corners = corner_numbers(segments)
     free = np.bincount(corners.ravel())[corners] == 1
     along = segments[:, 1] - segments[:, 0]
     fraction = np.minimum(radius / np.linalg.norm(along, axis=1), 0.5)
@@ -187,7 +187,7 @@ def nearest_points(first: Floats, second: Floats) -> tuple[Floats, Floats]:
     return first[:, 0] + s[:, None] * u, second[:, 0] + t[:, None] * v
 
 
-def _corner_numbers(segments: Floats) -> Whole:
+def corner_numbers(segments: Floats) -> Whole:
     """Number the points at which ends of segments meet: (M, 2), one number per end.
 
     Ends of different bodies that meet have equal numbers, too.

@@ -2,9 +2,10 @@
 
 The quadrilateral of a smarticle has the corners barb tip, hinge, hinge, barb tip; its fourth side closes the mouth. A
 link of another smarticle passes through the plane of the smarticle if the link's ends lie strictly on opposite sides
-of the plane and the link meets the plane strictly inside the quadrilateral. A link that ends in the plane, lies in the
-plane, or meets an edge does not pass, within 1e-9 of the smarticle's size. Barbs at unequal angles make the
-quadrilateral concave or self-intersecting; its inside is then where its winding number is not zero.
+of the plane and the link meets the plane strictly inside the quadrilateral. A corner in the plane, or a row of corners
+in it, counts as one passage if the links that leave it go to both sides, and as none if they go to one side. A tip that
+ends in the plane does not pass, and what meets an edge does not, within 1e-9 of the smarticle's size. Barbs at unequal
+angles make the quadrilateral concave or self-intersecting; its inside is then where its winding number is not zero.
 
 `polygon_crossings` counts for bodies of any shape. An open bent body spans the polygon of its corners, closed by the
 straight line between its free ends, as a U, C, Z or hook does; a ring spans its own polygon. These bodies span no
@@ -17,7 +18,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from dem.record.frame import Frame
@@ -34,7 +37,7 @@ from postprocess.geometry.links import (
     link_lengths,
     plane_frames,
 )
-from postprocess.geometry.segments import Curve, checked_segments, curves, segments_of
+from postprocess.geometry.segments import Curve, checked_segments, corner_numbers, curves, segments_of
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, rigid_in_space
 
 STRAIGHT = 0.99  #: Tip-to-tip distance over unfolded length above which a body counts as straight [-]
@@ -166,6 +169,14 @@ def polygon_crossings(segments: ArrayLike, body: ArrayLike) -> PolygonCrossings:
 
     Source:
         Savoie et al., Soft Matter 2023, ⟨N⟩ of smarticles; here for any flat curve.
+
+    Example:
+        >>> t = 2 * np.pi * np.arange(60) / 60
+        >>> ring = np.stack([np.cos(t), np.sin(t), 0 * t], axis=1)
+        >>> rings = np.stack([ring, ring[:, [0, 2, 1]] + [1.0, 0, 0]])
+        >>> segments = np.stack([rings, np.roll(rings, -1, axis=1)], axis=2).reshape(120, 2, 3)
+        >>> polygon_crossings(segments, np.repeat([0, 1], 60)).crossings
+        array([1, 1])
     """
     segments, body = checked_segments(segments, body)
     found = curves(segments, body)
@@ -176,6 +187,12 @@ def polygon_crossings(segments: ArrayLike, body: ArrayLike) -> PolygonCrossings:
             f"no body spans a polygon: {first}; the average crossing number is defined for every shape"
         )
     bodies, number = np.unique(body, return_inverse=True)
+    # Ends of different bodies that meet have equal numbers of corners.
+    meets = corner_numbers(segments)
+    _, first, ends = np.unique(number[:, None] * len(meets) * 2 + meets, return_index=True, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    # Ends of one corner may differ by rounding: a plane between them would be passed by neither segment.
+    segments = segments.reshape(-1, 3)[first][ends]
     middles = segments.mean(axis=1)
     half = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1) / 2
     tree, reach = cKDTree(middles), half.max()
@@ -190,7 +207,7 @@ def polygon_crossings(segments: ArrayLike, body: ArrayLike) -> PolygonCrossings:
         other = np.concatenate([np.array(one, dtype=np.int64) for one in near])
         apart = number[other] != owner[polygon]
         polygon, other = polygon[apart], other[apart]
-        passing = _passing_segments(corners, polygon, segments[other])
+        passing = _passing_segments(corners, polygon, segments[other], ends[other])
         pairs = np.stack([owner[polygon[passing]], number[other[passing]]], axis=1)
         unique, times = np.unique(pairs, axis=0, return_counts=True)
         counts = np.concatenate([counts, np.column_stack([unique.reshape(-1, 2), times])])
@@ -243,30 +260,74 @@ def _close_pairs(vertices: Floats, planes: Flags) -> tuple[Whole, Whole]:
 def _passing(vertices: Floats, i: Whole, j: Whole) -> Flags:
     """Return which links of each j pass through the plane of its i: (P, 3) bool."""
     links = np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2)
-    return _passing_segments(vertices, np.repeat(i, 3), links[j].reshape(-1, 2, 3)).reshape(-1, 3)
+    ends = vertices.shape[1] * j[:, None, None] + np.stack([np.arange(3), np.arange(1, 4)], axis=1)
+    passing = _passing_segments(vertices, np.repeat(i, 3), links[j].reshape(-1, 2, 3), ends.reshape(-1, 2))
+    return passing.reshape(-1, 3)
 
 
-def _passing_segments(corners: Floats, polygon: Whole, segments: Floats) -> Flags:
+def _passing_segments(corners: Floats, polygon: Whole, segments: Floats, ends: Whole) -> Flags:
     """Return which segments pass through a polygon: (P,) bool.
 
     Corners of N polygons are (N, n, 3) [m], the last one joined to the first. Segments are (P, 2, 3) [m], each compared
-    with the polygon whose index is in `polygon` (P,).
+    with the polygon whose index is in `polygon` (P,). `ends` (P, 2) numbers the corners of the bodies at their ends.
     """
     centres, radii = bounding_spheres(corners)
     frames = plane_frames(corners)
     outlines = np.einsum("nkc,nac->nka", corners - centres[:, None], frames[:, :2])
     passing = np.zeros(len(polygon), dtype=bool)
+    sides = np.zeros((len(polygon), 2), dtype=np.int8)
+
+    def inside(points: Floats, which: Whole) -> Flags:
+        """Return whether points (p, 3) [m], from the centres of polygons `which` (p,), are in them: (p,) bool."""
+        flat = np.einsum("pc,pac->pa", points, frames[which, :2])
+        found: Flags = _winding(flat, outlines[which], _TOLERANCE * radii[which]) != 0
+        return found
+
     for start in range(0, len(polygon), _CHUNK):
         which = polygon[start : start + _CHUNK]
         relative = segments[start : start + _CHUNK] - centres[which, None]
         heights = np.einsum("pkc,pc->pk", relative, frames[which, 2])
         heights[np.abs(heights) <= _TOLERANCE * radii[which, None]] = 0.0
+        sides[start : start + _CHUNK] = np.sign(heights)
         row = np.nonzero(heights[:, 0] * heights[:, 1] < 0)[0]
         first, last = heights[row].T
         from_, to = relative[row, 0], relative[row, 1]
-        hits = from_ + (first / (first - last))[:, None] * (to - from_)
-        flat = np.einsum("pc,pac->pa", hits, frames[which[row], :2])
-        passing[start + row] = _winding(flat, outlines[which[row]], _TOLERANCE * radii[which[row]]) != 0
+        passing[start + row] = inside(from_ + (first / (first - last))[:, None] * (to - from_), which[row])
+    # A segment that leaves a corner in the plane: whether it passes depends on the others that leave this corner.
+    leaving = np.nonzero((sides == 0).sum(axis=1) == 1)[0]
+    if len(leaving):
+        end = np.argmin(np.abs(sides[leaving]), axis=1)
+        points = segments[leaving, end] - centres[polygon[leaving]]
+        corner = _corners_in_plane(polygon, sides, ends)[leaving, end]
+        passing[leaving] = _through_corners(corner, sides[leaving].sum(axis=1), inside(points, polygon[leaving]))
+    return passing
+
+
+def _corners_in_plane(polygon: Whole, sides: NDArray[np.int8], ends: Whole) -> Whole:
+    """Number the corners that lie in the plane of a polygon: (P, 2), equal numbers for corners joined in the plane.
+
+    `polygon` (P,) is the polygon with which a segment is compared, `sides` (P, 2) are the signs of the heights of its
+    ends above the plane, `ends` (P, 2) their corners. Only numbers of ends in the plane have a meaning.
+    """
+    keys = polygon[:, None] * (ends.max() + 1) + ends
+    known, number = np.unique(keys, return_inverse=True)
+    number = number.reshape(keys.shape)
+    a, b = number[(sides == 0).all(axis=1)].T
+    graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(known), len(known)))
+    found: Whole = connected_components(graph, directed=False)[1].astype(np.int64)[number]
+    return found
+
+
+def _through_corners(corner: Whole, side: Whole, inside: Flags) -> Flags:
+    """Return which segments that leave a corner in the plane of a polygon count as its passage: (p,) bool.
+
+    At a corner (p,) whose segments go to both sides (p,), +1 and -1, the segments to the side with fewer pass. `inside`
+    (p,): whether their ends in the plane are in the polygon; a row of corners with one outside does not pass.
+    """
+    up, down = np.bincount(corner, side > 0), np.bincount(corner, side < 0)
+    outside = np.bincount(corner, ~inside) > 0
+    fewer = np.where(up <= down, 1, -1)
+    passing: Flags = (side == fewer[corner]) & ~outside[corner] & (np.minimum(up, down)[corner] > 0)
     return passing
 
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 from typing import Literal
 
+import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
@@ -113,6 +114,33 @@ def summarise_run(
     return pd.DataFrame(summaries)
 
 
+def columns_of(run: Run, phase: int, recorded: Iterable[str]) -> list[str]:
+    """Return the columns of numbers that `summarise_run` makes for a phase of a run, which need not have begun.
+
+    `recorded` are the names of its series.
+    """
+    found = [
+        *(
+            quantity.header
+            for measure in frame_measures(tuple(DEFINITIONS))
+            if measure.available_for(run)
+            for quantity in measure.quantities
+        ),
+        *(
+            _header(EVERY[name].label, EVERY[name].unit, component)
+            for name in recorded
+            if name not in _SERIES_MEASURED
+            for component in EVERY[name].components
+        ),
+    ]
+    whole = (measure for measure in phase_measures() if run.phases[phase].type in measure.phases)
+    return [
+        *("count", ASPECT, "time [s]", "frames averaged"),
+        *(column for name in found for column in (name, marked(name, "SE"))),
+        *(quantity.header for measure in whole for quantity in measure.quantities),
+    ]
+
+
 def _open(run: Run, definitions: Iterable[str]) -> tuple[FrameSequence, Series | None]:
     for definition in definitions:
         if definition not in DEFINITIONS:
@@ -185,12 +213,18 @@ def _series_columns(series: Series, time: float) -> dict[str, float]:
             continue
         # A newer version may have recorded a column that is unknown here.
         label = EVERY[name].label if name in EVERY else name
-        # Files write a pure number's unit as 1 and angles in radians; tables have a dash, and degrees as scenes do.
-        unit = {"1": "-", "": "-", "rad": "degree"}.get(series.units[name], series.units[name])
-        factor = math.degrees(1) if unit == "degree" else 1
-        if values.ndim == 1:
-            columns[f"{label} [{unit}]"] = factor * float(values[index])
-        else:
-            for component, value in zip(_COMPONENTS[values.shape[1]], values[index], strict=True):
-                columns[f"{label} {component} [{unit}]"] = factor * float(value)
+        unit = series.units[name]
+        factor = math.degrees(1) if unit == "rad" else 1
+        components = ("",) if values.ndim == 1 else _COMPONENTS[values.shape[1]]
+        for component, value in zip(components, np.atleast_1d(values[index]), strict=True):
+            columns[_header(label, unit, component)] = factor * float(value)
     return columns
+
+
+def _header(label: str, unit: str, component: str) -> str:
+    """Return the column of a quantity of the series: label, component, and unit.
+
+    Files write a pure number's unit as 1 and angles in radians; tables have a dash, and degrees as scenes do.
+    """
+    shown = {"1": "-", "": "-", "rad": "degree"}.get(unit, unit)
+    return f"{label} {component}".strip() + f" [{shown}]"

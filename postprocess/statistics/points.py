@@ -12,6 +12,7 @@ from collections.abc import Iterable, Sequence
 
 import pandas as pd
 
+from dem.strict import equal
 from postprocess.statistics.seeds import SeedMean, mean_over_seeds
 
 ASPECT, SEED, SEEDS = "aspect ratio [-]", "seed", "seeds [-]"
@@ -49,25 +50,45 @@ def averaged(group: pd.DataFrame, quantities: Iterable[str]) -> dict[str, float]
     return found
 
 
+def together(table: pd.DataFrame, columns: Iterable[str]) -> pd.DataFrame:
+    """Return a table in which numbers of columns that differ by rounding alone, see `equal`, are equal.
+
+    Each becomes the one with the fewest digits: 0.3 instead of 0.30000000000000004.
+    """
+    found = {}
+    for name in columns:
+        if table[name].dtype.kind in "fO":
+            groups: list[list[float]] = []
+            for value in sorted({one for one in table[name] if isinstance(one, float) and math.isfinite(one)}):
+                if groups and equal(value, groups[-1][-1]):
+                    groups[-1].append(value)
+                else:
+                    groups.append([value])
+            shortest = {value: min(group, key=lambda one: len(repr(one))) for group in groups for value in group}
+            found[name] = table[name].map(lambda one, names=shortest: names.get(one, one))
+    return table.assign(**found)
+
+
 def means_by(table: pd.DataFrame, by: Sequence[str], *, intervals: bool = False) -> pd.DataFrame:
     """Average the rows of each group of a table, with standard errors from the scatter of the rows.
 
     Args:
         table: One row per run, or per run and phase; names of quantities end with their unit in brackets. Standard
             errors within a run ("… SE […]") are ignored.
-        by: Columns whose values define the groups.
+        by: Columns whose values define the groups; numbers that differ by rounding alone are one value.
         intervals: Whether to add the half-widths "… 95 % […]" of confidence intervals.
 
     Returns:
         One row per group, in the order of its first row: the columns `by`, `RUNS`, then each quantity with its standard
-        error "… SE […]", NaN for a single run. Values of NaN are left out of the means. A quantity
-        with means of fewer rows than `RUNS` has a column "… n [-]" with the number of values, see `counted`.
+        error "… SE […]", NaN for a single run. Values of NaN are left out of the means. A quantity with means of fewer
+        rows than `RUNS` has a column "… n [-]" with the number of values, see `counted`.
 
     Example:
         >>> runs = pd.DataFrame({"friction": [0.2, 0.2, 0.4], "phi [-]": [0.1, 0.3, 0.5]})
         >>> means_by(runs, ["friction"]).round(3).values.tolist()
         [[0.2, 2.0, 0.2, 0.1], [0.4, 1.0, 0.5, nan]]
     """
+    table = together(table, by)
     numbers = table.select_dtypes(["number", "bool"]).columns
     quantities = [name for name in numbers if name.endswith("]") and name not in (*by, ASPECT) and " SE [" not in name]
     groups, rows = table.groupby(list(by), sort=False, dropna=False), []
@@ -132,5 +153,7 @@ def paired_differences(
         >>> paired_differences(runs, "N", "mu", (0.4, 0.8), ["seed"])["N"].tolist()
         [1.0, 2.0]
     """
-    first, second = (table[table[factor] == level].groupby(list(others))[quantity].mean().dropna() for level in levels)
+    table = together(table, others)
+    parts = (table[[equal(value, level) for value in table[factor]]] for level in levels)
+    first, second = (part.groupby(list(others))[quantity].mean().dropna() for part in parts)
     return (second - first).dropna().rename(quantity).reset_index()

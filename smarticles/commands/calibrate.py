@@ -9,9 +9,10 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING
 
+from dem.display import progress_of
 from dem.errors import InputError
 from dem.record.names import OF_SWEEP
-from dem.terminal import warn
+from dem.terminal import folded, screen_width, warn
 from smarticles import sweeps
 from smarticles.command_line import Commands, add_options, columns
 
@@ -81,35 +82,35 @@ def add(commands: Commands) -> None:
 
 def run_calibrate(arguments: argparse.Namespace) -> int:
     """Compute the missing runs of a calibration, and analyse it when all are done; return the exit status."""
-    import numpy as np  # noqa: PLC0415
-
     from studies.calibration.inference import calibrate, require_extra  # noqa: PLC0415
+    from studies.calibration.measures import check_measures  # noqa: PLC0415
     from studies.calibration.problem import load_problem  # noqa: PLC0415
     from studies.calibration.simulators import TableSimulator, read_runs  # noqa: PLC0415
 
     problem = load_problem(arguments.calibration)
-    if arguments.table is None:
-        # Scenes at both ends of all priors are checked before runs are spent on the values between them.
-        problem.sweep(1, np.stack(problem.bounds))
     for_cluster = sweeps.is_for_cluster(arguments)
+    table = None
+    if arguments.table is None:
+        check_measures(problem)
+    else:
+        table = TableSimulator(problem, read_runs(arguments.table, problem), str(arguments.table))
     if arguments.dry_run:
-        print(_listing(problem))
+        print(_listing(problem) if table is None else table.listing())
         return 0
     if arguments.out is None:
         raise InputError("calibrate: --out DIR is missing; give a directory, or --dry-run to only list the runs")
     require_extra()
     from studies.calibration.report import write  # noqa: PLC0415  (draws: an extra)
 
-    if arguments.table is not None:
-        table = TableSimulator(problem, read_runs(arguments.table), str(arguments.table))
-        result = calibrate(problem, table, say=_say)
-    else:
-        result = calibrate(problem, SweepSimulator(problem, arguments, for_cluster=for_cluster), say=_say)
+    simulator = table or SweepSimulator(problem, arguments, for_cluster=for_cluster)
+    result = calibrate(problem, simulator, say=_say, shown=progress_of)
     if result is None:
         print(f"when these runs are done, continue with: {arguments.command_line}")
         return 0
     output = arguments.out / "results"
-    print("\n".join(write(result, output, arguments.command_line)))
+    with progress_of("writing tables and figures"):
+        lines = write(result, output, arguments.command_line)
+    print(folded("\n".join(lines), width=screen_width()))
     print(f"tables and figures: {output}")
     return 0
 
@@ -189,11 +190,13 @@ class SweepSimulator:
         from studies.calibration.simulators import measured  # noqa: PLC0415
 
         found: list[tuple[Mapping[str, Value], Measured | None]] = []
-        for entry in folder.entries:
-            condition = entry.values["condition"]
-            names = [datum.measure for datum in self.problem.data if datum.condition == condition]
-            done = folder.is_done(entry)
-            found.append((entry.values, measured(Run(folder.run(entry)), names) if done else None))
+        with progress_of("measuring") as progress:
+            for number, entry in enumerate(folder.entries, start=1):
+                condition = entry.values["condition"]
+                names = [datum.measure for datum in self.problem.data if datum.condition == condition]
+                done = folder.is_done(entry)
+                found.append((entry.values, measured(Run(folder.run(entry)), names) if done else None))
+                progress("runs measured", number, len(folder.entries))
         return found
 
 

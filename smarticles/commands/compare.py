@@ -10,6 +10,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from dem.display import progress_of
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
 from smarticles.command_line import Cell, Commands, add_options, as_json, columns, reject_existing
@@ -138,7 +139,8 @@ def compare(one: Path, other: Path) -> dict[str, Any]:
         found = _compare_sweeps(open_folder(one), open_folder(other))
     else:
         first, second = open_run(one), open_run(other)
-        tables = [measured([path]) if has_frames(path) else None for path in (one, other)]
+        with progress_of("measuring") as progress:
+            tables = [measured([path], progress=progress) if has_frames(path) else None for path in (one, other)]
         found = {
             "scene": differences(first.scene, second.scene),
             "versions": differences(_made_by(first), _made_by(second)),
@@ -174,7 +176,8 @@ def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
     both = [name for name in begun[0] if name in begun[1]]
     varied = [values_in(folder) for folder in (one, other)]
     keys = [*(name for name in varied[0] if name != SEED and name in varied[1]), *PHASE]
-    tables = [grouped(measured([folder.path]), keys) for folder in (one, other)]
+    with progress_of("measuring") as progress:
+        tables = [grouped(measured([folder.path], progress=progress), keys) for folder in (one, other)]
     return {
         "scene": differences(*map(_listed, varied)),
         "versions": differences(*(_versions(runs.values()) for runs in (first, second))),

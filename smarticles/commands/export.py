@@ -1,11 +1,11 @@
 """Command `export`: write a run for other programs and archives, or a scene for LAMMPS."""
 
 import argparse
-import sys
+from functools import partial
 from pathlib import Path
 
+from dem.display import progress_of
 from dem.errors import InputError
-from dem.terminal import redraw
 from smarticles.command_line import Commands, add_options, names
 
 _FORMATS = ("vtp", "gsd", "stl", "obj", "gltf", "glb")
@@ -143,20 +143,17 @@ def export_run(arguments: argparse.Namespace) -> int:
         return _export_crate(arguments)
     from postprocess import export  # noqa: PLC0415  (imports PyVista)
 
-    def show_progress(done: int, count: int) -> None:
-        if sys.stderr.isatty() and count > 1:
-            redraw(f"frame {done} of {count}", last=done == count)
-
-    written = export.export_run(
-        arguments.directory,
-        to=arguments.to,
-        output=arguments.output,
-        time=arguments.time,
-        every_frame=arguments.all,
-        wanted=arguments.wanted,
-        unwanted=arguments.unwanted,
-        color_by=arguments.color_by,
-        progress=show_progress,
-    )
+    with progress_of("exporting") as progress:
+        written = export.export_run(
+            arguments.directory,
+            to=arguments.to,
+            output=arguments.output,
+            time=arguments.time,
+            every_frame=arguments.all,
+            wanted=arguments.wanted,
+            unwanted=arguments.unwanted,
+            color_by=arguments.color_by,
+            progress=partial(progress, "frames exported"),
+        )
     print(written)
     return 0

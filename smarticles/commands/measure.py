@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import sys
-import time
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
+from dem.display import progress_of
 from dem.errors import InputError
-from dem.terminal import redraw, warn
-from smarticles.command_line import Cell, Commands, add_options, as_json, columns, names, reject_existing
+from dem.terminal import screen_width, warn
+from smarticles.command_line import Cell, Commands, add_options, as_json, column_blocks, names, reject_existing
 from smarticles.measuring import DONE, STATE, group_columns, grouped, measured, of_phase, sources, states
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_WIDTH = 100  # characters of a terminal
+_WIDTH = 100  # most characters of a line of the legend
 _Column = tuple[str, str, str, float]  #: Heading, column of the full table, number format, unit conversion factor
 _ALWAYS = (("phase", "phase type", "", 1.0), ("t [s]", "time [s]", ".2f", 1.0))
 # Shown with --frames only, since their means over several frames have no meaning.
@@ -102,9 +101,10 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
         warn(warning)
     jobs = arguments.jobs or usable_cores()
-    table = measured(
-        arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=_Progress()
-    )
+    with progress_of("measuring") as progress:
+        table = measured(
+            arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=progress
+        )
     if arguments.phase is not None:
         try:
             table = of_phase(table, arguments.phase)
@@ -135,23 +135,6 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     if profile is not None:
         print(f"{profile}: φ(r, z), {len(rings)} rows")
     return 0
-
-
-class _Progress:
-    """Prints the number of measured runs: continuously on a terminal, else every ten seconds."""
-
-    def __init__(self) -> None:
-        self._last = time.monotonic()
-
-    def __call__(self, done: int, runs: int) -> None:
-        terminal, now = sys.stderr.isatty(), time.monotonic()
-        if runs > 1 and (terminal or now - self._last > 10):
-            self._last = now
-            text = f"measured {done} of {runs} runs"
-            if terminal:
-                redraw(text, last=done == runs)
-            else:
-                print(text, file=sys.stderr, flush=True)
 
 
 def _groups(arguments: argparse.Namespace) -> Sequence[str]:
@@ -199,15 +182,19 @@ def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> s
         for row in table.to_dict("records")
     ]
     header = ["runs" if name == RUNS else name for name in named]
-    lines = columns([*header, *(heading for heading, *_ in shown)], rows).splitlines()
-    if by:
-        return "\n".join(lines)
-    blocks, previous = [lines[0]], None
+    keys = len(named) + sum(column in _ALWAYS for column in shown)
+    blocks = column_blocks([*header, *(heading for heading, *_ in shown)], rows, keys=keys)
+    return "\n\n".join("\n".join(block if by else _with_names(block, table)) for block in blocks)
+
+
+def _with_names(lines: Sequence[str], table: pd.DataFrame) -> list[str]:
+    """Insert the name of each run, and its state if it is unfinished, before its rows into the lines of `table`."""
+    named, previous = [lines[0]], None
     for run, state, line in zip(table["run"], table[STATE], lines[1:], strict=True):
         title = f"{run}:" if state == DONE else f"{run} ({state}):"
-        blocks += [line] if run == previous else [title, line]
+        named += [line] if run == previous else [title, line]
         previous = run
-    return "\n".join(blocks)
+    return named
 
 
 def _notes(table: pd.DataFrame) -> list[str]:
@@ -300,4 +287,5 @@ def _legend(shown: Collection[str], *, per_frame: bool, by: Sequence[str], poure
         lines += [f"at yield: {QUANTITIES[YIELD]}"] if YIELD in shown else []
         lines += [f"at fracture: {QUANTITIES[FRACTURE]}"] if FRACTURE in shown else []
         lines.append(f"widening: {QUANTITIES[WIDENING]}")
-    return "\n".join(["", *(part for line in lines for part in wrap(line, _WIDTH, subsequent_indent="  "))])
+    width = min(screen_width() or _WIDTH, _WIDTH)
+    return "\n".join(["", *(part for line in lines for part in wrap(line, width, subsequent_indent="  "))])

@@ -2,13 +2,12 @@
 
 import argparse
 import math
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from dem.display import progress_of
 from dem.errors import InputError
-from dem.terminal import bare
 from smarticles.command_line import Commands, add_options, positive_number, reader
 
 _PICTURE_SUFFIX = ".png"
@@ -137,18 +136,19 @@ def render_run(arguments: argparse.Namespace) -> int:
         **({"frames_per_second": arguments.fps} if arguments.fps else {}),
     }
     if film:
-        track = _track if sys.stderr.isatty() else None
         span = {"start": arguments.start, "end": arguments.end, "every": arguments.every}
-        print(render.render_film(arguments.directory, output, track=track, **span, **options))
+        print(render.render_film(arguments.directory, output, track=_track, **span, **options))
     else:
         selection = {"time": arguments.time, "smarticle": arguments.smarticle}
-        print(render.render_run(arguments.directory, output=output, **selection, **options))
+        with progress_of("drawing"):
+            written = render.render_run(arguments.directory, output=output, **selection, **options)
+        print(written)
     return 0
 
 
 def _track(images: Iterable[Any], count: int) -> Iterable[Any]:
-    """Show a progress bar on the terminal while the images of a film are drawn."""
-    from rich.console import Console  # noqa: PLC0415  (takes 0.1 s)
-    from rich.progress import track  # noqa: PLC0415
-
-    return track(images, "drawing", total=count, console=Console(file=bare(sys.stderr)), transient=True)
+    """Show the progress while the images of a film are drawn."""
+    with progress_of("drawing") as progress:
+        for number, image in enumerate(images, start=1):
+            yield image
+            progress("pictures drawn", number, count)

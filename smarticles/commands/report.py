@@ -3,6 +3,7 @@
 import argparse
 from pathlib import Path
 
+from dem.display import Steps, progress_of
 from dem.errors import InputError
 from dem.record.names import MANIFEST, OF_SWEEP
 from smarticles.command_line import Commands, add_options, reject_existing
@@ -57,21 +58,22 @@ def write_report(arguments: argparse.Namespace) -> int:
             read_table(arguments.accuracy, of=tuple(QUANTITIES))
         except InputError as error:
             raise InputError(str(error).replace("--table", "--accuracy")) from None
-    text = _page(directory, arguments.accuracy, arguments.jobs, arguments.phase)
+    with progress_of(f"report of {directory}") as progress:
+        text = _page(directory, arguments.accuracy, arguments.jobs, arguments.phase, progress)
     with whole_file(output, overwrite=arguments.overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
     print(f"{output}: {len(text.encode()) / 1e6:.1f} MB; open it in a browser")
     return 0
 
 
-def _page(directory: Path, accuracy: Path | None, jobs: int | None, phase: str | None) -> str:
+def _page(directory: Path, accuracy: Path | None, jobs: int | None, phase: str | None, progress: Steps) -> str:
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from smarticles.reporting.run import run_page  # noqa: PLC0415  (pandas, matplotlib, PyVista)
     from smarticles.reporting.sweep import PROVENANCE, results_page, sweep_page  # noqa: PLC0415
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 
     if (directory / OF_SWEEP).is_file():
-        return sweep_page(open_folder(directory), accuracy, jobs=jobs or usable_cores(), phase=phase)
+        return sweep_page(open_folder(directory), accuracy, jobs=jobs or usable_cores(), phase=phase, progress=progress)
     if phase is not None:
         raise InputError(f"--phase {phase}: {directory} is no sweep; leave it out, the page of a run has all phases")
     if (directory / MANIFEST).is_file():

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dem.display import Display, Row
 from dem.errors import InputError
 from dem.record.names import MANIFEST, SCENE
 from dem.run.stop import StopRequest, StopRequestedError, release
@@ -150,13 +151,15 @@ def _run_until(
 ) -> int:
     scene = read_scene(scene_file, settings)
     _set_parallelism(scene, out, resume=resume, threads=arguments.threads, ranks=arguments.ranks)
-    # Imported last: both import YADE, which takes seconds and needs the variables set above.
-    from dem.run import run  # noqa: PLC0415
-
     quoted_out = shlex.quote(str(out))
     command = getattr(arguments, "recorded_as", None) or arguments.command_line
     try:
-        outcome = run.run_scene(scene, out, command=command, progress=sys.stderr.isatty(), resume=resume, stop=stop)
+        with Display() as display:
+            display.update(Row(label="starting"))
+            # Imported last: it imports YADE, which takes seconds and needs the variables set above.
+            from dem.run import run  # noqa: PLC0415
+
+            outcome = run.run_scene(scene, out, command=command, display=display, resume=resume, stop=stop)
     except StopRequestedError as stopped:
         print(f"smarticles: {stopped}; to be continued: smarticles resume {quoted_out}", file=sys.stderr)
         return TO_BE_CONTINUED

@@ -9,8 +9,11 @@ from textwrap import wrap
 from typing import Any
 
 from dem.errors import InputError, nearest
-from smarticles.command_line import Commands, add_options
+from dem.terminal import screen_width
+from smarticles.command_line import Commands, add_options, as_json
 from smarticles.starters import KINDS, about, starter
+
+_WIDEST = 100  # characters of a line
 
 
 def add(commands: Commands) -> None:
@@ -84,7 +87,7 @@ def print_keys(arguments: argparse.Namespace) -> int:
         print(
             *_described(schema),
             "",
-            *wrap(f"more, by `smarticles keys NAME`: {', '.join(known)}", 100, break_on_hyphens=False),
+            *wrap(f"more, by `smarticles keys NAME`: {', '.join(known)}", _width(), break_on_hyphens=False),
             sep="\n",
         )
         return 0
@@ -130,9 +133,14 @@ def _kinds(entry: Mapping[str, Any]) -> list[str]:
     return next(filter(None, map(_kinds, options)), [])
 
 
+def _width() -> int:
+    """Return the greatest length of a line."""
+    return min(screen_width() or _WIDEST, _WIDEST)
+
+
 def _described(definition: Mapping[str, Any]) -> Iterator[str]:
     """Yield lines of text about a part: its description; default, choices, range and meaning of its keys."""
-    yield from wrap(definition.get("description", ""), 100)
+    yield from wrap(definition.get("description", ""), _width())
     signs = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
     for key, entry in definition["properties"].items():
         options = entry.get("anyOf", [entry])
@@ -144,12 +152,12 @@ def _described(definition: Mapping[str, Any]) -> Iterator[str]:
             facts.insert(0, f"default {json.dumps(entry['default'], ensure_ascii=False)}")
         value = f": {entry['const']}" if "const" in entry else ""
         yield f"  {key}{value}" + (f"    {', '.join(facts)}" if facts and not value else "")
-        yield from wrap(entry.get("description", ""), 100, initial_indent=" " * 6, subsequent_indent=" " * 6)
+        yield from wrap(entry.get("description", ""), _width(), initial_indent=" " * 6, subsequent_indent=" " * 6)
 
 
 def print_schema(_: argparse.Namespace) -> int:
     """Print the JSON schema of scenes; return the exit status."""
     from dem.scene.reading import json_schema  # noqa: PLC0415
 
-    print(json.dumps(json_schema(), indent=2, ensure_ascii=False))
+    print(as_json(json_schema()))
     return 0

@@ -8,7 +8,9 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from dem.display import progress_of
 from dem.errors import InputError
+from dem.terminal import folded, screen_width
 from smarticles.command_line import Commands, add_options, columns
 from smarticles.measuring import follows
 from smarticles.sweeps import changed_sweep, compute, folder_of, raise_failures
@@ -37,7 +39,7 @@ DIR gets the runs, and DIR/results the tables, the figures and a picture of one 
 study; repeat the command to continue. `smarticles status DIR` prints the progress. --analyse analyses
 the finished runs, also while others are being computed.""",
         examples="""\
-  smarticles study gravish --quick --out demo
+  smarticles study gravish --quick --out gravish-quick
   smarticles study gravish --out gravish
   smarticles study gravish --out gravish --jobs 4            use 4 cores
   smarticles study gravish --out gravish-yade --engine yade    compute every run on YADE
@@ -123,10 +125,20 @@ def compute_and_analyse(
         results = folder.path / "results"
         # All runs are passed, since tables list unfinished runs as missing.
         runs = [folder.run(entry) for entry in folder.entries]
-        report = load().analyse(runs, results, note=note, full=full, command=arguments.command_line, earlier=earlier)
+        with progress_of("analysing") as progress:
+            report = load().analyse(
+                runs,
+                results,
+                note=note,
+                full=full,
+                command=arguments.command_line,
+                earlier=earlier,
+                progress=progress,
+            )
         figures = [f"figure: {path}" for path in report.files.values() if path.suffix == ".png"]
         origin = f"tables, and the origin of every number: {report.output}"
-        print(columns(report.header, report.rows), "", *report.lines, "", *figures, origin, sep="\n", flush=True)
+        lines = folded("\n".join(report.lines), width=screen_width())
+        print(columns(report.header, report.rows), "", lines, "", *figures, origin, sep="\n", flush=True)
         _draw(folder, finished, pictured, results / "run.png")
     # Raised last, so that the results of the finished runs are printed before.
     raise_failures(folder, outcomes)

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from dem.display import duration
 from dem.errors import InputError
 from dem.record.names import OF_SWEEP
 from smarticles import sweeps
@@ -140,8 +141,6 @@ def _draft(name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -
 
 def _listing(points: Sequence[Point], expected: Sequence[float]) -> str:
     """Return a table of the runs with their variables and expected wall times [s]."""
-    from templates.local import duration  # noqa: PLC0415
-
     names = list(points[0].values)
     rows = [
         [point.name, *(point.values[name] for name in names), round(wall)]

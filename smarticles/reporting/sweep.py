@@ -12,6 +12,7 @@ from typing import Any
 import pandas as pd
 from markupsafe import Markup
 
+from dem.display import Steps, silent
 from dem.errors import InputError, nearest
 from dem.record.run import Run
 from dem.scene.reading import load_scene
@@ -46,11 +47,14 @@ _MAX_STILLS, _MAX_CURVES, _MAX_CHARTS, _MAX_PARTS = 4, 5, 4, 4
 _LEAST_RUNS = 3  # for an interval that is worth its name
 
 
-def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int, phase: str | None = None) -> str:
+def sweep_page(
+    folder: Folder, accuracy: Path | None, *, jobs: int, phase: str | None = None, progress: Steps = silent
+) -> str:
     """Return the HTML page of a sweep or a study; `jobs` processes measure its runs.
 
     `accuracy` is the path of a table of measured errors; None: the table that ships. `phase` is the type of the phase
-    whose means come first, or "last"; None: the last phase of rest.
+    whose means come first, or "last"; None: the last phase of rest. `progress` is called after each run that is
+    measured or drawn.
     """
     runs = folder.status()
     known = study_of(folder.manifest.files)
@@ -70,8 +74,12 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int, phase: str |
         state.append(words(f"The study has not been analysed yet; analyse it with: {command}", tone="note"))
     sections = (
         ("State", state),
-        *(_result_sections(results) if analysed else _measured(folder, varied, jobs=jobs, phase=phase)),
-        ("Final states", _pictures(folder)),
+        *(
+            _result_sections(results)
+            if analysed
+            else _measured(folder, varied, jobs=jobs, phase=phase, progress=progress)
+        ),
+        ("Final states", _pictures(folder, progress)),
         ("Variables", [table("Variables and constants", ["name", "values", "number of values"], variables)]),
         (
             "Scene",
@@ -130,7 +138,9 @@ def _scenes(folder: Folder) -> dict[str, Scene]:
 # -- measures ----------------------------------------------------------------------------------------------------------
 
 
-def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int, phase: str | None) -> list[Section]:
+def _measured(
+    folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int, phase: str | None, progress: Steps
+) -> list[Section]:
     """Measure a sweep with `jobs` processes; return sections of tables and charts of means over runs.
 
     Means are over finished runs with equal variables. `varied` has all values of each variable and constant. `phase` is
@@ -139,7 +149,7 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int,
     if not any(has_frames(folder.run(entry)) for entry in folder.entries):
         return [("Result", [words("No run has frames yet.", tone="note")])]
     leading = _leading_phases(folder, phase)
-    runs = measured([folder.path], costly="never", jobs=jobs)
+    runs = measured([folder.path], costly="never", jobs=jobs, progress=progress)
     # Variables that are a function of another one, as the count may be of l/w, do not define groups.
     by: list[str] = []
     for name, values in varied.items():
@@ -225,18 +235,18 @@ def _few(means: pd.DataFrame) -> str:
     return f" {few} of {len(means)} points have fewer than {_LEAST_RUNS} runs." if few else ""
 
 
-def _pictures(folder: Folder) -> list[Markup]:
+def _pictures(folder: Folder, progress: Steps) -> list[Markup]:
     """Return pictures of evenly chosen finished runs with one seed, and views all around the last run."""
     done = [entry for entry in folder.entries if folder.is_done(entry)]
     one_seed = [entry for entry in done if entry.values.get(SEED) == done[0].values.get(SEED)]
     count = min(_MAX_STILLS, len(one_seed))
     chosen = [one_seed[round(k * (len(one_seed) - 1) / max(count - 1, 1))] for k in range(count)]
     limits = _common_limits([Run(folder.run(entry)) for entry in chosen])
-    return [
-        block
-        for entry in chosen
-        for block in picture_blocks(folder.run(entry), name=entry.name, turn=entry is chosen[-1], limits=limits)
-    ]
+    blocks = []
+    for number, entry in enumerate(chosen, start=1):
+        blocks += picture_blocks(folder.run(entry), name=entry.name, turn=entry is chosen[-1], limits=limits)
+        progress("runs drawn", number, len(chosen))
+    return blocks
 
 
 def _common_limits(runs: Sequence[Run]) -> tuple[float, float] | None:

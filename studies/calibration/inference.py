@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
+from dem.display import Shown, unseen
 from studies.calibration.emulator import Array, Emulator, fit
 from studies.calibration.problem import CONDITION, Problem
 from templates.sweep.render import Value
@@ -138,15 +139,17 @@ class Result:
         return pd.DataFrame(rows)
 
 
-def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None] = print) -> Result | None:
+def calibrate(
+    problem: Problem, simulator: Simulator, say: Callable[[str], None] = print, shown: Shown = unseen
+) -> Result | None:
     """Run all waves and sample the posterior; return None if runs of a wave are still in a queue.
 
     The first wave has points of a Sobol sequence in the priors. Each further wave has those points of a finer sequence
     that the runs so far do not rule out. A condition is a combination of the data's variables, such as l/w and count;
     conditions without data to fit are run in the last wave only.
 
-    `say` prints a line about each wave. InputError if the budget is too small, or too few runs finished for an
-    emulator.
+    `say` prints a line about each wave, `shown` shows the computations between runs. InputError if the budget is too
+    small, or too few runs finished for an emulator.
     """
     size = problem.points_per_wave
     emulators: list[Emulator | None] = []
@@ -168,8 +171,9 @@ def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None]
             return None
         missing = [values for values, measured in found if not measured]
         tables.append(pd.DataFrame([{"wave": wave, **values, **(measured or {})} for values, measured in found]))
-        emulators = emulate(problem, pd.concat(tables, ignore_index=True))
-        distances = implausibility(problem, emulators, candidates)
+        with shown(f"wave {wave}: fitting emulators"):
+            emulators = emulate(problem, pd.concat(tables, ignore_index=True))
+            distances = implausibility(problem, emulators, candidates)
         before, share = share, float(np.mean(distances < CUTOFF))
         waves.append({"wave": wave, "points": len(theta), "runs": len(found), "failed": len(missing)})
         waves[-1] |= {"prior not ruled out before [%]": 100 * before, "and after [%]": 100 * share}
@@ -180,7 +184,8 @@ def calibrate(problem: Problem, simulator: Simulator, say: Callable[[str], None]
             f"no parameters reach all data within {CUTOFF:g} standard deviations: the discrepancy is larger than "
             f"assumed ({100 * problem.content.discrepancy:g} %), the priors are too narrow, or data are wrong"
         )
-    chain, best, diagnostics = sample(problem, emulators)
+    with shown("sampling the posterior"):
+        chain, best, diagnostics = sample(problem, emulators)
     if diagnostics["steps over autocorrelation time"] < ENOUGH_TIMES:
         warnings.append(f"the chain has not converged: fewer than {ENOUGH_TIMES} autocorrelation times")
     for datum, emulator in zip(problem.data, emulators, strict=True):

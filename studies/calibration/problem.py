@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationError, model_validator
 from scipy import stats
 
-from dem.errors import InputError, shown
-from dem.strict import Strict, explained
+from dem.errors import InputError, nearest, shown
+from dem.strict import Strict, equal, explained
 from dem.yaml_text import parse_yaml
 from templates.sweep.expand import Point, points_of
 from templates.sweep.from_scene import as_template
-from templates.sweep.render import Value
+from templates.sweep.render import Value, variables_of
 from templates.sweep.sweep_file import SEED, Sweep, SweepFile, parse_table, read_text
 
 Array = NDArray[np.float64]
@@ -229,7 +229,22 @@ class Problem:
             template=file,
             template_text=text if content.template else self._template(text, file),
         )
-        return sweep, points_of(sweep, runs)
+        points = points_of(sweep, runs)
+        self._check_used(sweep)
+        return sweep, points
+
+    def _check_used(self, sweep: Sweep) -> None:
+        """Raise InputError for a variable without effect: the runs would be spent on nothing."""
+        used = variables_of(sweep.template_text)
+        file = self.path.parent / self.content.data
+        places = {
+            **dict.fromkeys(self.names, f"{self.path}: free"),
+            **dict.fromkeys(self.conditions[0], f"{file}, line 1: column"),
+        }
+        for name in sorted(places.keys() - used):
+            raise InputError(
+                f"{places[name]}: {name!r} is no variable of {sweep.template}; {nearest(name, sorted(used))}"
+            )
 
     def _template(self, text: str, file: Path) -> str:
         """Turn the text of a scene into a template with a variable for each of `keys`, and one for the seed.
@@ -288,10 +303,11 @@ def _read_data(
         if predict not in (0, 1):
             raise InputError(f"{where}: {PREDICT}: {predict!r} is neither 0 (fit) nor 1 (predict only)")
         condition = {name: row[name] for name in variables}
-        if condition not in conditions:
+        index = next((k for k, one in enumerate(conditions) if equal(one, condition)), len(conditions))
+        if index == len(conditions):
             conditions.append(condition)
         datum = Datum(
-            condition=conditions.index(condition),
+            condition=index,
             measure=str(row[MEASURE]),
             value=float(value),
             error=float(error),

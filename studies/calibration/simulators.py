@@ -12,13 +12,17 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError, RunError, nearest
+from dem.record.files import read_csv
 from dem.record.run import Run
+from dem.strict import equal
+from dem.terminal import warn
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import summarise_run
 from studies.calibration.emulator import Array
 from studies.calibration.inference import Measured
 from studies.calibration.problem import CONDITION, Problem
 from templates.sweep.render import Value
+from templates.sweep.sweep_file import cell_value
 
 
 @dataclass(frozen=True)
@@ -45,14 +49,17 @@ class FunctionSimulator:
             return None
 
 
-def read_runs(path: Path) -> pd.DataFrame:
-    """Read a table of runs made elsewhere; InputError if it cannot be read."""
-    try:
-        return pd.read_csv(path, comment="#")
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"--table {path}: cannot be read: {error}; give a CSV file whose first line names columns"
-        ) from error
+def read_runs(path: Path, problem: Problem) -> pd.DataFrame:
+    """Read a table of runs made elsewhere; InputError if it cannot be read.
+
+    Variables of the data of the problem are read as they are there: 007 is text.
+    """
+    variables = dict.fromkeys(problem.conditions[0], str)
+    remedy = "give a CSV file whose first line names columns"
+    table = read_csv("runs of --table", path, remedy, comment="#", dtype=variables)
+    for name in variables.keys() & set(table.columns):
+        table[name] = table[name].map(cell_value, na_action="ignore")
+    return table
 
 
 class TableSimulator:
@@ -65,26 +72,52 @@ class TableSimulator:
         needed |= {datum.measure for datum in problem.data}
         for name in sorted(needed - set(table.columns)):
             raise InputError(f"{source}: column {name!r} is missing; columns are {', '.join(table.columns)}")
-        self.problem, self.table = problem, table
+        self.problem, self.table, self.source = problem, table, source
 
     def planned(self, wave: int) -> Array:
         """Return the parameters (n, d) of all rows."""
         found: Array = self.table[list(self.problem.names)].to_numpy(np.float64)
         return found
 
+    def listing(self) -> str:
+        """Return in words how many runs are at conditions of the data."""
+        found = self.run(1, self.planned(1))
+        return f"{self.source}: {len(found)} of {len(self.table)} runs are at conditions of the data"
+
     def run(self, wave: int, theta: Array) -> list[tuple[Mapping[str, Value], Measured | None]]:
         """Return variables and measures of the rows whose variables match a condition of the data.
 
-        `wave` and `theta` are not used: the table is the only wave.
+        `wave` and `theta` are not used: the table is the only wave. A warning states how many rows match no condition.
         """
         found: list[tuple[Mapping[str, Value], Measured | None]] = []
         measures = list(dict.fromkeys(datum.measure for datum in self.problem.data))
+        others = []
         for row in self.table.to_dict("records"):
+            own = {name: row[name] for name in self.problem.conditions[0]}
             for index, condition in enumerate(self.problem.conditions):
-                if all(row[name] == value for name, value in condition.items()):
+                if equal(own, condition):
                     parameters = {name: row[name] for name in self.problem.names}
                     found.append(({**parameters, **condition, CONDITION: index}, {m: row[m] for m in measures}))
+                    break
+            else:
+                others.append(own)
+        if others:
+            place = ", ".join(f"{name} {value}" for name, value in others[0].items())
+            warn(f"{self.source}: {len(others)} of {len(self.table)} runs are left out: no data are at {place}")
         return found
+
+
+def column_and_phase(name: str, kinds: Sequence[str], where: str) -> tuple[str, int]:
+    """Return column and index of the phase of a measure, `COLUMN` or `COLUMN @ PHASE`; see `measured`.
+
+    InputError, which begins with the place `where`, if there is no such phase among those of the given `kinds`.
+    """
+    column, _, phase = (part.strip() for part in name.partition("@"))
+    try:
+        return column, range(len(kinds))[int(phase or -1)]
+    except (ValueError, IndexError):
+        there = ", ".join(f"{index} {kind}" for index, kind in enumerate(kinds))
+        raise InputError(f"{where}: measure {name!r}: no phase {phase!r}; there are {there}") from None
 
 
 def measured(run: Run, names: Sequence[str]) -> dict[str, float]:
@@ -94,15 +127,8 @@ def measured(run: Run, names: Sequence[str]) -> dict[str, float]:
     phase, from 0, or from the end as -1; default: the last phase. InputError if there is no such phase or column, or a
     file is damaged.
     """
-    count = len(run.phases)
-    wanted: dict[str, tuple[str, int]] = {}
-    for name in names:
-        column, _, phase = (part.strip() for part in name.partition("@"))
-        try:
-            index = range(count)[int(phase or -1)]
-        except (ValueError, IndexError):
-            raise InputError(f"{run.path}: measure {name!r}: no phase {phase!r}; there are 0 to {count - 1}") from None
-        wanted[name] = column, index
+    kinds = [phase.type for phase in run.phases]
+    wanted = {name: column_and_phase(name, kinds, str(run.path)) for name in names}
     # Costly definitions are measured only if they are asked for.
     used = [one for one in DEFINITIONS if any(one in column for column, _ in wanted.values())]
     table = summarise_run(run, definitions=used, phases={index for _, index in wanted.values()}).set_index("phase")

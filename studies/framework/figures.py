@@ -605,10 +605,13 @@ def draw_means(
     Half-widths of the 95 % intervals are those of y (n,), and `across` those of x, (n,), or (2, n) for the lower and
     the upper side; NaN where unknown, None for no bars. `properties` are arguments of Matplotlib's `Axes.errorbar`.
     """
-    bars = axes.errorbar(
-        x, y, yerr=half_widths, xerr=across, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label
+    # Without a known error the legend must not show a bar.
+    up, aside = (
+        None if part is None or not np.isfinite(np.asarray(part, float)).any() else part
+        for part in (half_widths, across)
     )
-    if any(part is not None and np.isfinite(np.asarray(part, float)).any() for part in (half_widths, across)):
+    bars = axes.errorbar(x, y, yerr=up, xerr=aside, **{"markersize": 3.4, "linewidth": 0.7, **properties}, label=label)
+    if up is not None or aside is not None:
         for lines in bars.lines[2]:
             lines.set_label(_CONFIDENCE)
 

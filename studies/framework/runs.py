@@ -14,6 +14,7 @@ from typing import Any
 import pandas as pd
 from numpy.typing import NDArray
 
+from dem.display import Steps, silent
 from dem.errors import InputError
 from dem.plan.steps import time_steps
 from dem.record.document import Phase
@@ -275,15 +276,18 @@ def collect_runs(
     measure: Callable[[Run], MeasuredRun],
     *,
     earlier: Mapping[str, MeasuredRun] | None = None,
+    progress: Steps = silent,
 ) -> Collected:
     """Measure the finished runs among given run directories, and list the others as missing.
 
     If `measure` raises InputError, the run is missing, with the status "unusable". Measured runs of an `earlier`
-    analysis, by name, replace directories that do not exist. InputError if no run is finished.
+    analysis, by name, replace directories that do not exist. `progress` is called before each run. InputError if no
+    run is finished.
     """
     runs: list[MeasuredRun] = []
     missing: list[MissingRun] = []
-    for directory in run_dirs:
+    for number, directory in enumerate(run_dirs):
+        progress("runs measured", number, len(run_dirs))
         before = (earlier or {}).get(Path(directory).name)
         if before is not None and not Path(directory).exists():
             runs.append(before)

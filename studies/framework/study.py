@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from dem.display import Steps, silent
 from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.report import figures as style
@@ -107,6 +108,7 @@ class Study:
         full: str = "",
         command: str,
         earlier: Mapping[str, MeasuredRun] | None = None,
+        progress: Steps = silent,
     ) -> Report:
         """Measure runs, and write tables, text, provenance and figures into a folder.
 
@@ -117,9 +119,10 @@ class Study:
             note: how the runs differ from the full study, for footers.
             full: what the full study found, for footers; empty if these runs are the full study.
             earlier: runs of an earlier analysis by name, which replace directories that do not exist.
+            progress: function that is called after each run that is measured.
         """
         output = make_folder(output)
-        found = collect_runs(self.name, run_dirs, self.measured, earlier=earlier)
+        found = collect_runs(self.name, run_dirs, self.measured, earlier=earlier, progress=progress)
         self.reject_unlike(found)
         tables = self.tabulate(found.table(), found.times())
         judged = self.judge(tables)

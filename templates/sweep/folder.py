@@ -7,7 +7,6 @@ DIR/logs/NAME.txt       output of the run's process
 DIR/jobs/               submissions to a queue, see `templates.slurm.submission`
 """
 
-import fcntl
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -21,6 +20,7 @@ from dem.record.files import write_text
 from dem.record.names import MANIFEST as RUN
 from dem.record.names import OF_SWEEP as MANIFEST
 from dem.record.run import Run, Status
+from dem.record.rundir import acquired
 from dem.scene.reading import dump_scene
 from templates.sweep.expand import Point
 from templates.sweep.sweep_file import SEED, Sweep
@@ -148,16 +148,21 @@ class Folder:
         """Lock the sweep, and yield the file descriptor that the processes of its runs must inherit.
 
         The lock lasts until the last process with this descriptor ends, so that runs which outlive a killed parent
-        process keep the sweep locked. InputError if another process holds the lock.
+        process keep the sweep locked. InputError if another process holds the lock, if the directory cannot be written,
+        or if its file system has no locks.
         """
-        with (self.path / ".lock").open("a") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
+        try:
+            lock = (self.path / ".lock").open("a")
+        except OSError as error:
+            raise InputError(
+                f"{self.path}: cannot be written ({error.strerror}); allow it, or copy the sweep"
+            ) from None
+        with lock as file:
+            if not acquired(file, str(self.path)):
                 raise InputError(
                     f"{self.path}: runs of this sweep are being computed already; wait for them "
                     f"(smarticles status {self.path}) or stop that process"
-                ) from error
+                )
             yield file.fileno()
 
 

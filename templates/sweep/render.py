@@ -18,6 +18,7 @@ from typing import Any, NoReturn
 
 import jinja2
 import yaml
+from jinja2 import meta
 from jinja2.runtime import Context
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
@@ -149,6 +150,11 @@ def evaluate(expression: str, values: Mapping[str, Value], source: str) -> Value
     except _FAILURES as error:
         _reject(error, f"{source} = {shown(expression)}", values)
     return result
+
+
+def variables_of(template: str) -> set[str]:
+    """Return the names of the variables that a template uses; jinja2.TemplateError if it is not valid."""
+    return meta.find_undeclared_variables(_environment().parse(template))
 
 
 def render_text(template: str, values: Mapping[str, Value], source: str) -> str:

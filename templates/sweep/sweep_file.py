@@ -17,7 +17,7 @@ import yaml
 from pydantic import AfterValidator, Field, ValidationError, field_validator, model_validator
 
 from dem.errors import InputError, nearest, shown
-from dem.strict import Strict, explained
+from dem.strict import Strict, equal, explained
 from dem.yaml_text import parse_yaml
 from templates.sweep.render import Value
 
@@ -25,6 +25,9 @@ SEED = "seed"
 LONGEST_TABLE = 10_000_000  # characters; a table of 100 000 points, more than a sweep can compute, is shorter
 ENGINE = "engine"  #: The constant of a sweep that names the engine of its scenes
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+_BOOLEANS = {"true": True, "false": False}
+_WHOLE = re.compile(r"[-+]?(?:0|[1-9][0-9]{0,999})\Z")
+_NUMBER = re.compile(r"[-+]?(?:(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:e[-+]?[0-9]+)?|inf|nan)\Z", re.IGNORECASE)
 _RESERVED = {SEED, "loop", "true", "false", "none", "True", "False", "None"}
 
 
@@ -273,9 +276,9 @@ def on_engine(sweep: Sweep, engine: str) -> Sweep:
 
 
 def read_text(path: Path, what: str) -> str:
-    """Return the text of a file; InputError, which calls the file `what`, if it is no readable UTF-8 text."""
+    """Return the text of a file without its byte-order mark; InputError, which calls it `what`, if it is not UTF-8."""
     try:
-        with path.open(encoding="utf-8") as file:
+        with path.open(encoding="utf-8-sig") as file:
             text = file.read(LONGEST_TABLE + 1)
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not UTF-8 text (byte {error.start}); a {what} is a text file") from error
@@ -286,9 +289,10 @@ def read_text(path: Path, what: str) -> str:
     return text
 
 
-def parse_table(text: str, source: str) -> list[dict[str, int | float | str]]:
-    """Return the rows of a CSV text whose first line names the columns; cells become numbers if possible.
+def parse_table(text: str, source: str) -> list[dict[str, bool | int | float | str]]:
+    """Return the rows of a CSV text whose first line names the columns.
 
+    Cells are numbers, true or false, or else text: also 007 and 1_2, which are names and lose characters as numbers.
     InputError for no row, an invalid column name, a row of another length, or an empty cell.
     """
     rows = [row for row in csv.reader(io.StringIO(text)) if row]
@@ -306,17 +310,18 @@ def parse_table(text: str, source: str) -> list[dict[str, int | float | str]]:
         if len(row) != len(header) or not all(cell.strip() for cell in row):
             msg = f"{source}, row {number}: expected {len(header)} filled cells ({', '.join(header)}): got {row!r}"
             raise InputError(msg)
-        table.append({name: _cell(cell.strip()) for name, cell in zip(header, row, strict=True)})
+        table.append({name: cell_value(cell) for name, cell in zip(header, row, strict=True)})
     return table
 
 
-def _cell(text: str) -> int | float | str:
-    for convert in (int, float):
-        try:
-            return convert(text)
-        except ValueError:
-            continue
-    return text
+def cell_value(text: str) -> bool | int | float | str:
+    """Return the value of a cell of a table, see `parse_table`."""
+    text = text.strip()
+    if text.lower() in _BOOLEANS:
+        return _BOOLEANS[text.lower()]
+    if _WHOLE.match(text):
+        return int(text)
+    return float(text) if _NUMBER.match(text) else text
 
 
 def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]], str | None]:
@@ -337,7 +342,7 @@ def _read_table(path: Path, table: Table | None) -> tuple[list[dict[str, Value]]
 def matching(
     rows: Sequence[dict[str, Value]], only: Mapping[str, Sequence[Value]], where: str, nouns: tuple[str, str]
 ) -> list[dict[str, Value]]:
-    """Return the rows that have, in each variable named in `only`, one of the values listed there.
+    """Return the rows that have, in each variable named in `only`, one of the values listed there; see `equal`.
 
     InputError if no row is left, or a variable or a value of `only` occurs in no row; it has the place of `only`,
     `where`, and words for a variable and for a row, `nouns`.
@@ -349,10 +354,10 @@ def matching(
             raise InputError(f"{where}.{name}: no such {variable}; {nearest(name, sorted(rows[0]))}")
         present = [row[name] for row in rows]
         for value in wanted:
-            if value not in present:
+            if not any(equal(value, one) for one in present):
                 known = ", ".join(dict.fromkeys(map(str, present)))
                 raise InputError(f"{where}.{name}: no {row_} has {value!r}; there are {known}")
-        kept = [row for row in kept if row[name] in wanted]
+        kept = [row for row in kept if any(equal(row[name], value) for value in wanted)]
     if not kept:
         raise InputError(f"{where}: keeps no {row_}; give fewer conditions")
     return kept

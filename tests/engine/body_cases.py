@@ -38,7 +38,7 @@ def clumps(data: dict[str, Any]) -> dict[str, Any]:
 
 def run(file: str, out: str, how: str = "") -> None:
     """Run a scene to its end, to a time, or from its last checkpoint on."""
-    scene, options = load_scene(Path(file)), {"command": "", "progress": False}
+    scene, options = load_scene(Path(file)), {"command": ""}
     if how in ("", "resume"):
         run_scene(scene, Path(out), resume=how == "resume", **options)
         return

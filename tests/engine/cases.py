@@ -163,7 +163,7 @@ def shaken_force(data: dict[str, Any], *, count: int, samples: int, every: int) 
 def run(data: dict[str, Any], out: str) -> dict[str, Any]:
     """A whole run; errors come back as text."""
     try:
-        run_scene(scene_of(data), Path(out), command="test", progress=False)
+        run_scene(scene_of(data), Path(out), command="test")
     except (InputError, RunError) as error:
         return {"error": type(error).__name__, "text": str(error)}
     return {"error": None, "text": ""}

@@ -235,7 +235,7 @@ def poured(engine: str, seed: int, out: str) -> dict[str, float]:
         "phases": phases,
         "recording": {"series_interval_s": 0.01, "frame_interval_s": 0.1, "checkpoint_interval_s": 0.2},
     }
-    run_scene(small(changes), Path(out), command="", progress=False)
+    run_scene(small(changes), Path(out), command="")
     series = Run(Path(out)).series
     found = {}
     for name, phase in (("poured", 1), ("shaken", 3)):

@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parents[2]
 RUN = (
     "import sys; from pathlib import Path\n"
     "from dem.run.run import run_scene; from dem.scene.reading import load_scene\n"
-    "run_scene(load_scene(Path(sys.argv[1])), Path(sys.argv[2]), command='test', progress=False)"
+    "run_scene(load_scene(Path(sys.argv[1])), Path(sys.argv[2]), command='test')"
 )
 TIMEOUT = 300  # s of wall time, for machines that are busy with long simulations
 

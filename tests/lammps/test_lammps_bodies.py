@@ -23,9 +23,9 @@ def test_a_mixture_settles_and_goes_on_with_the_same_bits(tmp_path: Path) -> Non
     phases = [{"type": "deposit", "per_layer": 6}, {"type": "relax", "duration_s": 0.1}]
     scene = small({"engine": "lammps", "count": 12, "particle": PARTICLE, "phases": phases, "recording": recording})
     whole, parts = tmp_path / "whole", tmp_path / "parts"
-    run_scene(scene, whole, command="", progress=False)
+    run_scene(scene, whole, command="")
     run_until(scene, parts, 0.17)
-    run_scene(scene, parts, command="", progress=False, resume=True)
+    run_scene(scene, parts, command="", resume=True)
     one, other = Run(whole), Run(parts)
     assert_equal_frames(one, other)
     last, series = one.frames[-1], one.series

@@ -145,7 +145,7 @@ def test_a_run_whose_rank_is_killed_reports_it_loses_nothing_and_continues(
 
     cause = r"^at t = 0\.05\d\d s .*LAMMPS ended: rank \d was ended by signal 9 \(Killed\); if memory ran out"
     with pytest.raises(RunError, match=cause) as caught:
-        run_scene(scene, out, command="test", progress=False, builders=Builders(engine=Fatal()))
+        run_scene(scene, out, command="test", builders=Builders(engine=Fatal()))
     assert "last good checkpoint: t = 0.04" in str(caught.value)
     failed = json.loads((out / "failed.json").read_text())
     assert failed["status"] == "failed"
@@ -155,7 +155,7 @@ def test_a_run_whose_rank_is_killed_reports_it_loses_nothing_and_continues(
     assert "run " in log.read_text()
     log.unlink()
     log.parent.rmdir()
-    outcome = run_scene(scene, out, command="test", progress=False, resume=True)
+    outcome = run_scene(scene, out, command="test", resume=True)
     assert outcome is not None
     times = read_series(out)["time_s"]
     assert np.abs(np.diff(times) - 0.004).max() < 2e-4

@@ -117,7 +117,7 @@ def test_a_hook_pulls_without_energy_from_nowhere(tmp_path: Path) -> None:
     }  # fmt: skip
     out = tmp_path / "run"
     try:
-        run_scene(parse_scene(data, source="scene"), out, command="", progress=False, resume=False)
+        run_scene(parse_scene(data, source="scene"), out, command="", resume=False)
     except RunError as error:
         assert "is held by the lower hook and the upper hook, which have moved apart" in str(error)  # noqa: PT017
     series = read_series(out)

@@ -95,7 +95,7 @@ def test_first_flight_is_that_of_a_free_body(name: str) -> None:
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_pile_of_each_shape_settles(name: str, tmp_path: Path) -> None:
     scene = scene_of(name, count=12)
-    done = run_scene(scene, tmp_path / "run", command="", progress=False)
+    done = run_scene(scene, tmp_path / "run", command="")
     assert done is not None
     run = Run(tmp_path / "run")
     frame, series, kinds = run.frames[-1], run.series, run.manifest.kinds
@@ -120,10 +120,10 @@ def test_a_pile_of_each_shape_settles(name: str, tmp_path: Path) -> None:
 def test_a_mixture_of_all_shapes_goes_on_with_the_same_bits(tmp_path: Path) -> None:
     scene = scene_of(*SHAPES, count=20)
     whole, parts = tmp_path / "whole", tmp_path / "parts"
-    run_scene(scene, whole, command="", progress=False)
+    run_scene(scene, whole, command="")
     run_until(scene, parts, 0.17)
     assert Run(parts).status.time_s < 0.9 * Run(whole).status.time_s  # type: ignore[operator]
-    run_scene(scene, parts, command="", progress=False, resume=True)
+    run_scene(scene, parts, command="", resume=True)
     one, other = Run(whole), Run(parts)
     assert len(one.frames) > 5
     assert_equal_frames(one, other)
@@ -183,7 +183,7 @@ def test_a_staple_of_right_angles_falls_and_collides_as_a_smarticle(tmp_path: Pa
     staple = {"particle": {"shape": "staple", "crown_m": 0.0117, "leg_m": 0.7 * 0.0117}}
     runs = []
     for name, changes in (("smarticle", {}), ("staple", staple)):
-        run_scene(small(common | recording | changes), tmp_path / name, command="", progress=False)
+        run_scene(small(common | recording | changes), tmp_path / name, command="")
         runs.append(Run(tmp_path / name))
     one, other = runs
     assert one.manifest.time_step_s == other.manifest.time_step_s

@@ -33,13 +33,13 @@ def test_a_light_smarticle_that_swings_fast_ends_and_one_too_fast_stops(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = light()
-    run_scene(scene, tmp_path / "run", command="", progress=False)
+    run_scene(scene, tmp_path / "run", command="")
     # Without motors 0.387 m/s, five times the speed of a fall, would be the limit.
     fastest = np.max(open_run(tmp_path / "run").series["max_speed_m_per_s"])
     assert 0.387 < fastest < build.speed_by_motors(scene)
     monkeypatch.setattr(build, "speed_by_motors", lambda _: 0.0)
     with pytest.raises(RunError, match=r"a speed above 0\.387 m/s .*which nothing in this scene explains"):
-        run_scene(scene, tmp_path / "stopped", command="", progress=False)
+        run_scene(scene, tmp_path / "stopped", command="")
 
 
 def test_the_speed_of_a_shaft_that_springs_back_is_that_of_all_its_energy_in_one_barb() -> None:

@@ -59,7 +59,7 @@ def worms(count: int = 8, **changes: Any) -> Scene:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     out = tmp_path_factory.mktemp("worms") / "whole"
-    run_scene(worms(), out, command="", progress=False)
+    run_scene(worms(), out, command="")
     return Run(out)
 
 
@@ -176,7 +176,7 @@ def test_tails_are_the_last_nodes() -> None:
 
 def test_a_lift_that_grips_nothing_says_so(tmp_path: Path) -> None:
     phases = [PHASES[0], {"type": "lift", "above_m": 0.5, "distance_m": 0.001, "speed_m_per_s": 0.02}]
-    run_scene(worms(count=2, phases=phases), tmp_path / "run", command="", progress=False)
+    run_scene(worms(count=2, phases=phases), tmp_path / "run", command="")
     assert "nothing was gripped" in (tmp_path / "run" / "log.txt").read_text()
 
 

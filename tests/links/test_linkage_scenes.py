@@ -62,7 +62,7 @@ def crowd(**changes: Any) -> Scene:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     out = tmp_path_factory.mktemp("chains") / "whole"
-    run_scene(crowd(), out, command="", progress=False)
+    run_scene(crowd(), out, command="")
     return Run(out)
 
 
@@ -118,7 +118,7 @@ def test_free_chains_that_fold_come_to_rest_without_violence(tmp_path: Path) -> 
     chain = {"shape": "chain", "links": 5, "link_m": 0.0094, "joints": joints}
     phases = [{"type": "deposit", "per_layer": 12}]
     scene = crowd(particle=chain, count=12, phases=phases, recording={}, **{"container.radius_m": 0.02})
-    run_scene(scene, tmp_path / "run", command="", progress=False)
+    run_scene(scene, tmp_path / "run", command="")
     series = read_series(tmp_path / "run")
     assert series["max_speed_m_per_s"].max() < 1.0
     assert series["max_speed_m_per_s"][-1] < 0.02

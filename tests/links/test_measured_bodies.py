@@ -26,7 +26,7 @@ def run(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
     phases = [{"type": "deposit", "per_layer": 10}, {"type": "relax", "duration_s": 0.05}]
     particle = [{"shape": name, **sizes} for name, sizes in KINDS.items()]
     scene = {"engine": "links", "fidelity": request.param, "count": 25, "particle": particle, "phases": phases}
-    run_scene(small(scene | {"container.radius_m": 0.015}), path, command="", progress=False)
+    run_scene(small(scene | {"container.radius_m": 0.015}), path, command="")
     return Run(path)
 
 

@@ -20,6 +20,9 @@ from dem.record.series import Series, read_series
 from dem.run.build import build_engine
 from dem.run.run import run_scene
 from dem.scene.scene import Scene
+from postprocess.measures.registry import phase_measures
+from postprocess.measures.table import summarise_run
+from studies.calibration.measures import columns_of_scene
 
 G, DT = 9.81, 2e-5
 RADIUS, MASS = builds.DIAMETER / 2, builds.boxes(0.0).mass
@@ -261,13 +264,25 @@ def blocks() -> Scene:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
     out = tmp_path_factory.mktemp("blocks") / "whole"
-    run_scene(blocks(), out, command="", progress=False)
+    run_scene(blocks(), out, command="")
     return Run(out)
 
 
 @pytest.fixture(scope="module")
 def series(run: Run) -> Series:
     return read_series(run.path)
+
+
+def test_the_columns_of_a_scene_are_those_of_its_run(run: Run) -> None:
+    table = summarise_run(run).set_index("phase")
+    others = {quantity.header for measure in phase_measures() for quantity in measure.quantities}
+    for phase, row in table.iterrows():
+        numbers = {name for name, value in row.items() if not isinstance(value, str) and name != "seed"}
+        # Rows of a table have the columns of measures of all phases.
+        wanted = {name for name in numbers if name not in others or math.isfinite(row[name])}
+        found = set(columns_of_scene(blocks(), int(str(phase))))
+        assert wanted <= found
+        assert found <= numbers
 
 
 def test_a_run_that_was_stopped_in_any_of_the_phases_goes_on_with_equal_bits(

@@ -14,7 +14,7 @@ from dem.errors import InputError, RunError
 from studies.calibration import emulator, inference, report
 from studies.calibration.inference import Array, Result, calibrate
 from studies.calibration.problem import Datum, Problem, load_problem
-from studies.calibration.simulators import FunctionSimulator, TableSimulator
+from studies.calibration.simulators import FunctionSimulator, TableSimulator, read_runs
 
 ASPECTS = (0.4, 0.7, 1.0)
 MEASURES = ("phi_0", "phi_f")
@@ -226,6 +226,56 @@ def test_runs_of_a_table_are_taken(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert np.array_equal(result.draws, calibrated(problem).draws)
     with pytest.raises(InputError, match=r"runs.csv: column 'wall' is missing; columns are "):
         TableSimulator(problem, table.drop(columns="wall"), "runs.csv")
+
+
+def test_runs_of_a_table_match_conditions_in_spite_of_rounding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(inference, "MOST_STEPS", 500)
+    problem = written(tmp_path, (0.5, 0.6), keys="budget: 60\nwaves: 1")
+    theta = inference.first_points(problem, 20)
+    table = pd.DataFrame([{**values, **simulated(values)} for values in problem.runs(1, theta)])
+    rounded = table.replace({"l_over_w": {0.7: 0.7000000000000001}})
+    rounded.to_csv(tmp_path / "runs.csv", index=False)
+    found = TableSimulator(problem, read_runs(tmp_path / "runs.csv", problem), "runs.csv").run(1, theta)
+    assert len(found) == len(table) == 60
+    assert {values["l_over_w"] for values, _ in found} == set(ASPECTS)
+    assert capsys.readouterr().err == ""
+    others = pd.concat([table, table.iloc[:2].assign(l_over_w=0.5)])
+    assert len(TableSimulator(problem, others, "runs.csv").run(1, theta)) == 60
+    stated = "runs.csv: 2 of 62 runs are left out: no data are at l_over_w 0.5"
+    assert stated in capsys.readouterr().err
+
+
+def test_text_and_booleans_of_a_table_are_those_of_the_data(tmp_path: Path) -> None:
+    problem = written(tmp_path, (0.5, 0.6), keys="budget: 60\nwaves: 1")
+    data = "sand,flat,measure,value,error\n007,true,phi,0.1,0.01\n7,false,phi,0.1,0.01\n"
+    (tmp_path / "data.csv").write_text(data)
+    problem = load_problem(tmp_path / "calibration.yaml")
+    (tmp_path / "runs.csv").write_text("friction,wall,sand,flat,phi\n0.5,0.6,007,TRUE,0.1\n0.5,0.6,7,False,0.2\n")
+    found = TableSimulator(problem, read_runs(tmp_path / "runs.csv", problem), "runs.csv").run(1, np.empty(0))
+    assert [(values["condition"], measured) for values, measured in found] == [(0, {"phi": 0.1}), (1, {"phi": 0.2})]
+
+
+def test_rows_of_a_table_that_are_longer_than_its_header_are_rejected(tmp_path: Path) -> None:
+    problem = written(tmp_path, (0.5, 0.6))
+    for first in (1, 0):  # rows that begin with 0, 1, … would look like those of a table without an index
+        (tmp_path / "runs.csv").write_text(f"friction,wall\n{first},2,3\n{first + 1},5,6\n")
+        with pytest.raises(
+            InputError, match=r"cannot read runs of --table .*/runs.csv: rows have more cells than .*; name each"
+        ):
+            read_runs(tmp_path / "runs.csv", problem)
+
+
+def test_data_that_differ_by_rounding_are_at_one_condition(tmp_path: Path) -> None:
+    written(tmp_path, (0.5, 0.6))
+    data = tmp_path / "data.csv"
+    text = data.read_text().replace("0.7,phi_f", "0.7000000000000001,phi_f")
+    data.write_text(text, encoding="utf-8-sig")  # as spreadsheets write it
+    assert len(load_problem(tmp_path / "calibration.yaml").conditions) == 3
+    data.write_text(text + "0.7,phi_f,0.1,0.1,0\n")
+    with pytest.raises(InputError, match=r"row 8: phi_f \(l_over_w 0.7\) is given twice"):
+        load_problem(tmp_path / "calibration.yaml")
 
 
 @pytest.mark.parametrize(

@@ -37,6 +37,7 @@ def test_error_bars_are_named_once_and_only_where_there_are_any(tmp_path: Path) 
     assert footer(figure, tmp_path, notes=["Note."]) == f"Note. {BARS}. {' '.join(ORIGIN)}"
     figure, axes = figures.new_figure()
     points(axes, [1.0, 2.0], [np.nan, np.nan])
+    assert not axes.containers[0].has_yerr, "the legend shows a bar"
     draw_bounds(axes, [0.0, 1.0], [1.0, np.nan], 0.2, properties=PROPERTIES)
     assert footer(figure, tmp_path) == " ".join(ORIGIN)
 

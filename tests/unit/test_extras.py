@@ -43,7 +43,7 @@ repeats: {seeds: [1, 2]}
 CALIBRATION = """\
 schema_version: 1
 name: small
-template: scene.yaml.j2
+template: contact.yaml.j2
 free: {friction: {low: 0.2, high: 1.0}}
 data: data.csv
 budget: 10
@@ -56,9 +56,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("core")
     (folder / "sitecustomize.py").write_text(BLOCKER)
     (folder / "scene.yaml.j2").write_text(SCENE)
+    (folder / "contact.yaml.j2").write_text(SCENE + "contact: {friction_smarticle: {{ friction }}}\n")
     (folder / "sweep.yaml").write_text(SWEEP)
     (folder / "calibration.yaml").write_text(CALIBRATION)
-    (folder / "data.csv").write_text("measure,value,error\nphi [-],0.1,0.01\n")
+    (folder / "data.csv").write_text("measure,value,error\nphi second-highest-com [-],0.1,0.01\n")
     return folder
 
 

@@ -158,7 +158,7 @@ def whole(
     begun = time.process_time()
     try:
         scene = scene_of(data)
-        run.run_scene(scene, out, command="stability", progress=False, builders=builders)
+        run.run_scene(scene, out, command="stability", builders=builders)
     except (InputError, RunError) as caught:
         error = type(caught).__name__, str(caught)
     total = time.process_time() - begun

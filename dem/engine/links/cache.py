@@ -239,10 +239,10 @@ def announce(seconds: float = math.nan) -> None:
     if not _ANNOUNCED.is_set():
         _ANNOUNCED.set()
         about = "" if math.isnan(seconds) else f", about {seconds:.0f} s of processor time"
-        kept = "" if folder() is None else f"; the code is kept in {folder()}"
+        kept = "" if folder() is None else "; later runs find the code"
         LOG.warning("compiling the links engine%s%s", about, kept)
 
 
 @cache
 def _announce_wait() -> None:
-    LOG.warning("another process compiles the links engine; waiting until its code is in %s", folder())
+    LOG.warning("another process compiles the links engine; waiting for its code")

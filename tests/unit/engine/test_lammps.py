@@ -182,7 +182,7 @@ def test_what_is_missing_is_named_and_no_directory_is_left(
     programs(**there)
     way_out = r"`make setup-mpi` or `apt-get install lammps openmpi-bin`, or use engine: yade"
     with pytest.raises(RunError, match=rf"^engine: lammps needs the program {missing}, .*; install it with {way_out}"):
-        run_scene(small({"engine": "lammps"}), tmp_path / "run", command="test", progress=False)
+        run_scene(small({"engine": "lammps"}), tmp_path / "run", command="test")
     assert not (tmp_path / "run").exists()
 
 

@@ -196,7 +196,7 @@ def no_yade(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_missing_yade_leaves_no_directory(tmp_path: Path) -> None:
     out = tmp_path / "run"
     with pytest.raises(RunError, match=r"^YADE cannot be imported .* `make setup`"):
-        run_scene(small(), out, command="test", progress=False)
+        run_scene(small(), out, command="test")
     assert not out.exists()
 
 

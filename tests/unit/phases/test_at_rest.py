@@ -29,7 +29,7 @@ def run_with(own: Phase, out: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
     data = changed(SMALL, {"recording": {"series_interval_s": 0.004, "frame_interval_s": 0.02}})
     scene = parse_scene(data, source="test")
     pour, _, shake = scene.phases
-    run_scene(scene.model_copy(update={"phases": (pour, own, shake, own)}), out, command="test", progress=False)
+    run_scene(scene.model_copy(update={"phases": (pour, own, shake, own)}), out, command="test")
     return Run(out)
 
 

@@ -45,7 +45,7 @@ def poured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     data = changed(SMALL, {"phases.1": RELAX, "phases.2": SHAKE, "recording": RECORDING})
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("dem.engine.yade.kind.YadeKind", KindDouble)
-        run_scene(parse_scene(data, source="pour"), out, command="test", progress=False)
+        run_scene(parse_scene(data, source="pour"), out, command="test")
     return out
 
 
@@ -109,7 +109,6 @@ def test_a_run_begins_with_the_poses_of_the_frame_above_its_floor(
         scene_of(pour, {"frame": "last" if which == "last" else number}),
         tmp_path / "on",
         command="test",
-        progress=False,
     )
     source, taken = read_frames(pour)[number], read_frames(tmp_path / "on")[0]
     assert which == "last" or abs(source.floor_z) > 1e-4
@@ -167,7 +166,7 @@ def test_a_run_is_resumed_from_its_checkpoint_without_its_source(
     pour: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = scene_of(pour)
-    run_scene(scene, tmp_path / "straight", command="test", progress=False)
+    run_scene(scene, tmp_path / "straight", command="test")
     taken = Simulation._checkpoint
 
     def checkpoint(simulation: Simulation) -> None:
@@ -177,9 +176,9 @@ def test_a_run_is_resumed_from_its_checkpoint_without_its_source(
     with monkeypatch.context() as patch:
         patch.setattr(Simulation, "_checkpoint", checkpoint)
         with pytest.raises(KeyboardInterrupt):
-            run_scene(scene, tmp_path / "stopped", command="test", progress=False)
+            run_scene(scene, tmp_path / "stopped", command="test")
     pour.rename(tmp_path / "elsewhere")
-    run_scene(scene, tmp_path / "stopped", command="test", progress=False, resume=True)
+    run_scene(scene, tmp_path / "stopped", command="test", resume=True)
     ends = [read_frames(tmp_path / name)[-1].vertices for name in ("straight", "stopped")]
     assert np.array_equal(*ends)
 

@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import h5py
 import numpy as np
 import pytest
@@ -116,3 +119,14 @@ def test_a_flipped_bit_is_found_by_the_checksum_and_a_series_without_checksums_i
     with pytest.raises(InputError, match=r"series\.h5: its content does not fit its checksums") as error:
         read_series(run)
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("mode", ["r", "r+"])
+@pytest.mark.parametrize("locking", [True, False])
+def test_a_series_is_read_while_it_is_open_elsewhere(run, mode, locking):
+    with h5py.File(run / "series.h5", mode, locking=locking):
+        assert len(read_series(run).time) == 3
+        if (mode, locking) != ("r+", True):
+            return
+        code = f"from dem.record.series import read_series; assert len(read_series({str(run)!r}).time) == 3"
+        subprocess.run([sys.executable, "-c", code], check=True)

@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
@@ -225,6 +227,35 @@ def test_a_reader_begins_again_if_the_file_changes_meanwhile(tmp_path: Path) -> 
 
     assert vtkhdf._read(path, "frames", number) == 2
     assert numbers == [1, 2]
+
+
+@pytest.mark.parametrize("mode", ["r", "r+"])
+@pytest.mark.parametrize("locking", [True, False])
+def test_frames_are_read_while_the_file_is_open_elsewhere(tmp_path: Path, mode: str, *, locking: bool) -> None:
+    path = write(tmp_path, (3, 5))
+    with h5py.File(path, mode, locking=locking):
+        holds(path, (3, 5))
+
+
+@pytest.mark.parametrize("killed", [False, True])
+def test_frames_are_read_and_added_while_another_process_has_the_file_open_to_write(
+    tmp_path: Path, *, killed: bool
+) -> None:
+    path = write(tmp_path, (3, 5))
+    # HDF5 marks the file as open; the mark of a killed process stays.
+    code = f"import h5py, os, sys; f = h5py.File({str(path)!r}, 'r+'); print('open', flush=True); sys.stdin.read()"
+    with subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        assert other.stdout.readline() == b"open\n"
+        if killed:
+            other.kill()
+            other.wait()
+        holds(path, (3, 5))
+        if killed:
+            write(tmp_path, (3, 5, 4), first=2)
+            holds(path, (3, 5, 4))
+            read_by_vtk(path, (3, 5, 4))
+        other.kill()
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ TRIED = int(os.environ.get("CORRUPTED", "25"))
 
 
 def run(scene: Scene, out: Path, *, resume: bool = False) -> None:
-    run_scene(scene, out, command="test", progress=False, resume=resume)
+    run_scene(scene, out, command="test", resume=resume)
 
 
 def results(out: Path) -> list[bytes]:

@@ -31,7 +31,7 @@ def start(out: Path, heights: Sequence[float] = (0.02, 0.03), **changes: Any) ->
     engine = EngineDouble.of(scene, DT)
     positions = np.array([[0.0, 0.0, height] for height in heights]).reshape(-1, 3)
     engine.add(Poses(positions, (Rotation.identity(),) * len(heights)))
-    return scene, engine, build_recorder(scene, out, ProgressWriter(out, scene.count, show=False))
+    return scene, engine, build_recorder(scene, out, ProgressWriter(out, scene.count))
 
 
 def take(engine: EngineDouble, recorder: Recorder, samples: int) -> None:
@@ -81,7 +81,7 @@ def test_restoring_its_memory_removes_later_files(tmp_path: Path) -> None:
     memory, columns, saved = json.loads(json.dumps(recorder.memory)), recorder.series.columns, engine.save(tmp_path)
     take(engine, recorder, 8)
     ends = files(tmp_path), recorder.series.columns
-    again = build_recorder(scene, tmp_path, ProgressWriter(tmp_path, scene.count, show=False))
+    again = build_recorder(scene, tmp_path, ProgressWriter(tmp_path, scene.count))
     engine = EngineDouble.of(scene, DT)
     engine.load(saved, tmp_path)
     again.restore(memory, columns)

@@ -59,7 +59,7 @@ def kind(monkeypatch: pytest.MonkeyPatch) -> KindDouble:
 
 
 def run(scene: Scene, out: Path, **how: Any) -> Done | None:
-    return run_scene(scene, out, command="test", progress=False, **how)
+    return run_scene(scene, out, command="test", **how)
 
 
 def series(out: Path) -> dict[str, bytes]:

@@ -127,7 +127,7 @@ def test_waves_are_sweeps_that_the_repeated_command_continues(
     plain.write_text(SCENE + f"contact: {json.dumps({**preset, 'restitution': 0.5})}\n")
     assert scene_hash(load_scene(scene)) == scene_hash(load_scene(plain))
 
-    calibration.write_text(CALIBRATION.replace("mu: {low: 0.2", "mu: {low: 0.1").replace("n: count", "n: seed"))
+    (calibration.parent / "scene.yaml").write_text(SCENE.replace("0.3}", "0.4}"))
     assert "holds another sweep" in smarticles(*words).err
     calibration.write_text(CALIBRATION.replace("mu", "other"))
     assert "wave1: its runs have no variable 'other'; give" in smarticles(*words).err
@@ -167,16 +167,73 @@ def test_wrong_files_are_rejected(calibration: Path, smarticles: Smarticles, old
     assert stated in said.err
 
 
-def test_a_measure_that_does_not_exist_is_named(calibration: Path, smarticles: Smarticles, write_run: WriteRun) -> None:
-    data = calibration.parent / "data.csv"
-    data.write_text(DATA.replace(PHI, "phi second-highest [-] @ 1"))
-    words = ["calibrate", calibration, "--out", calibration.parent / "out", "--submit", "none"]
-    smarticles(*words)
-    folder = open_folder(calibration.parent / "out" / "wave1")
-    for entry in folder.entries:
-        finish(folder, entry, write_run)
-    said = smarticles(*words)
+@pytest.mark.parametrize(
+    ("measure", "stated"),
+    [
+        ("phi second-highest [-] @ 1", "no column 'phi second-highest [-]' in phase 1, relax; did you mean"),
+        ("phi second-highest-com [-] @ 2", "no phase '2'; there are 0 deposit, 1 relax"),
+        ("phi second-highest-com [-] @ -3", "no phase '-3'; there are 0 deposit, 1 relax"),
+        ("phi second-highest-com [-] @ last", "no phase 'last'; there are"),
+        ("scene_sha256", "no column 'scene_sha256'"),
+        ("peak stress [Pa]", "no column 'peak stress [Pa]' in phase 1, relax; "),  # of a phase `compress`
+        ("container force [N]", "no column 'container force [N]' in phase 1, relax; did you mean 'container force "),
+        ("motor work [J]", "no column 'motor work [J]'"),
+        ("crossing number mean [-]", "no column 'crossing number mean [-]'"),  # on request only
+    ],
+)
+def test_a_measure_that_runs_will_not_have_is_rejected_before_any_run(
+    calibration: Path, smarticles: Smarticles, measure: str, stated: str
+) -> None:
+    (calibration.parent / "data.csv").write_text(f"n,measure,value,error\n10,{PHI},0.12,0.002\n12,{measure},1,0.1\n")
+    out = calibration.parent / "out"
+    for words in (["--dry-run"], ["--out", out, "--submit", "none"]):
+        said = smarticles("calibrate", calibration, *words)
+        assert said.status == 2
+        assert f"data.csv: measure '{measure}': " in said.err
+        assert stated in said.err
+        assert len(said.err.splitlines()) == 1
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("measure", ["crossings mean [-]", "container force x [N] @ 0", "phi voxel [-]", "time [s]"])
+def test_measures_of_frames_and_series_are_accepted(calibration: Path, smarticles: Smarticles, measure: str) -> None:
+    (calibration.parent / "data.csv").write_text(f"n,measure,value,error\n10,{measure},1,0.1\n")
+    assert smarticles("calibrate", calibration, "--dry-run").status == 0
+
+
+def test_a_condition_of_the_last_wave_alone_is_checked_at_the_start(calibration: Path, smarticles: Smarticles) -> None:
+    (calibration.parent / "data.csv").write_text(DATA.replace("\n12,", "\n-12,"))
+    out = calibration.parent / "out"
+    said = smarticles("calibrate", calibration, "--out", out, "--submit", "none")
     assert said.status == 2
-    assert "measure 'phi second-highest [-]' is no column; " in said.err
-    data.write_text(DATA.replace("@ 1", "@ 2"))
-    assert "measure 'phi second-highest-com [-] @ 2': no phase '2'; there are 0 to 1" in smarticles(*words).err
+    assert "count: -12 is out of range" in said.err
+    assert not out.exists()
+
+
+def test_a_variable_without_effect_is_rejected(calibration: Path, smarticles: Smarticles) -> None:
+    folder = calibration.parent
+    text = SCENE.replace("seed: 1", "seed: {{ seed }}").replace("count: 12", "count: {{ n }}")
+    (folder / "scene.yaml.j2").write_text(text + "contact: {friction_smarticle: {{ mu }}}\n")
+    lines = CALIBRATION.replace("keys: {mu: contact.friction_smarticle, n: count}\n", "")
+    calibration.write_text(lines.replace("scene: scene.yaml", "template: scene.yaml.j2"))
+    assert smarticles("calibrate", calibration, "--dry-run").status == 0
+    calibration.write_text(calibration.read_text().replace("{mu: {", "{wall: {low: 0.1, high: 0.2}, mu: {"))
+    said = smarticles("calibrate", calibration, "--dry-run")
+    assert said.status == 2
+    assert f"free: 'wall' is no variable of {folder}/scene.yaml.j2; " in said.err
+    (folder / "data.csv").write_text(
+        DATA.replace("n,", "n,note,").replace("\n10,", "\n10,a,").replace("\n12,", "\n12,b,")
+    )
+    assert "'note' is no variable" in smarticles("calibrate", calibration, "--dry-run").err
+
+
+def test_a_dry_run_checks_a_table_of_runs(calibration: Path, smarticles: Smarticles) -> None:
+    table = calibration.parent / "runs.csv"
+    calibration.write_text(CALIBRATION + "waves: 1\n")
+    table.write_text(f"mu,n,{PHI}\n0.5,10,0.1\n0.6,12.000000000001,0.1\n0.7,14,0.1\n")
+    words = ["calibrate", calibration, "--dry-run", "--table", table]
+    said = smarticles(*words)
+    assert (said.status, said.out) == (0, f"{table}: 2 of 3 runs are at conditions of the data\n")
+    assert "1 of 3 runs are left out: no data are at n 14" in said.err
+    table.write_text("mu,n\n0.5,10\n")
+    assert f"column '{PHI}' is missing; columns are mu, n" in smarticles(*words).err

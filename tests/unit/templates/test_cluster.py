@@ -39,6 +39,10 @@ def cluster(tmp_path: Path) -> Cluster:
     return load_cluster(write(tmp_path))
 
 
+def test_a_byte_order_mark_is_no_part_of_a_cluster_file(tmp_path: Path, cluster: Cluster) -> None:
+    assert load_cluster(write(tmp_path, "\ufeff" + FILE)) == cluster
+
+
 @pytest.mark.parametrize("name", shipped_clusters())
 def test_shipped_clusters_are_valid(name: str) -> None:
     assert load_cluster(name).name == name

@@ -7,7 +7,7 @@ from sweep_cases import SCENE, SWEEP, WriteSweep
 
 from dem.errors import InputError
 from templates.sweep.expand import Point, expand
-from templates.sweep.sweep_file import load_sweep, on_engine
+from templates.sweep.sweep_file import load_sweep, on_engine, parse_table, read_text
 
 COUNTS = "l_over_w,n,label\n0.4,494,long\n0.7,270,middle\n1.0,192,short\n"
 
@@ -151,6 +151,59 @@ def test_table_keeps_only_the_wanted_rows(write_sweep: WriteSweep) -> None:
     )
     found = points(text, write_sweep, counts_csv=COUNTS)
     assert [point.values["l_over_w"] for point in found] == [0.4, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("cell", "value"),
+    [
+        *[(text, text) for text in ("1_2", "007", "-007", "00.5", "1_0e3", "１２", "0x10", "no", "rough")],
+        *[("12", 12), ("-3", -3), ("0", 0), ("0.5", 0.5), (".5", 0.5), ("1.", 1.0), ("1e-3", 0.001), ("1E3", 1000.0)],
+        *[("true", True), ("True", True), ("FALSE", False)],
+    ],
+)
+def test_cells_of_a_table_are_numbers_booleans_or_text(cell: str, value: object) -> None:
+    (row,) = parse_table(f"a\n {cell} \n", "table.csv")
+    assert (row["a"], type(row["a"])) == (value, type(value))
+
+
+def test_a_table_varies_a_boolean(write_sweep: WriteSweep) -> None:
+    text = sweep_with(
+        "{table: {file: flags.csv}}",
+        run_name="n{{ count }}_{{ 'open' if forces else 'shut' }}",
+        more="constants: {seed_: 1}",
+    )
+    scene = SCENE.replace("seed }}", "seed_ }}") + "recording: {contact_forces: {{ forces }}}\n"
+    found = points(text, write_sweep, scene=scene, flags_csv="count,forces\n10,true\n20,false\n")
+    assert [(point.name, point.scene.recording.contact_forces) for point in found] == [
+        ("n10_open", True),
+        ("n20_shut", False),
+    ]
+
+
+def test_a_byte_order_mark_is_no_part_of_a_text(write_sweep: WriteSweep) -> None:
+    mark = "\ufeff"
+    text = sweep_with("{table: {file: counts.csv}}", more="derived: {count: n}\nrepeats: {seeds: [1]}")
+    found = points(mark + text, write_sweep, scene=mark + SCENE, counts_csv=mark + COUNTS)
+    assert [point.scene.count for point in found] == [494, 270, 192]
+    folder = write_sweep(text, quoted_csv=f'{mark}"a",b\n1,2\n').parent
+    assert parse_table(read_text(folder / "quoted.csv", "table"), "table") == [{"a": 1, "b": 2}]
+
+
+def test_conditions_hold_for_numbers_that_differ_by_rounding(write_sweep: WriteSweep) -> None:
+    third = "l_over_w,count\n0.30000000000000004,10\n0.4,20\n1,30\n"
+    text = sweep_with(
+        "{table: {file: t.csv, only: {l_over_w: [0.3, 1.0]}}}", run_name="{{ count }}", more="repeats: {seeds: [1]}"
+    )
+    assert [point.name for point in points(text, write_sweep, t_csv=third)] == ["10", "30"]
+    more = MORE.replace("grid: {count: [10, 20, 30]}", "zip: {count: [10, 20], x: [0.30000000000000004, 0.4]}")
+    found = points(more.replace("{count: [30, 10]}", "{x: [0.3]}"), write_sweep)
+    assert [point.name for point in found[4:]] == ["n10_seed7", "n10_seed3"]
+
+
+def test_a_boolean_is_no_number_in_conditions(write_sweep: WriteSweep) -> None:
+    text = sweep_with("{table: {file: t.csv, only: {flag: [1]}}}", run_name="{{ count }}", more="repeats: {seeds: [1]}")
+    with pytest.raises(InputError, match="has 1; there are True, False"):
+        points(text, write_sweep, t_csv="flag,count\ntrue,10\nfalse,20\n")
 
 
 def test_sources_are_crossed_and_the_later_varies_faster(write_sweep: WriteSweep) -> None:

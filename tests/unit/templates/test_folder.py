@@ -1,9 +1,13 @@
 """The directory of a sweep: manifest, scenes, states, rejections."""
 
+import errno
+import fcntl
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 from sweep_cases import SWEEP, MakeFolder
@@ -124,4 +128,23 @@ def test_runs_left_behind_by_a_killed_runner_still_hold_the_sweep(make_folder: M
     finally:
         left.communicate(b"\n")
     with folder.lock():
+        pass
+
+
+def test_a_sweep_that_cannot_be_written_ends_in_one_line(make_folder: MakeFolder) -> None:
+    folder = make_folder()
+    (folder.path / ".lock").mkdir()
+    with pytest.raises(InputError, match=r"cannot be written \(Is a directory\); allow it, or copy"), folder.lock():
+        pass
+
+
+def test_a_sweep_on_a_file_system_without_locks_ends_in_one_line(
+    make_folder: MakeFolder, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def flock(*_: object) -> NoReturn:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    folder = make_folder()
+    monkeypatch.setattr(fcntl, "flock", flock)
+    with pytest.raises(InputError, match=r"its file system cannot lock files \(No locks available\)"), folder.lock():
         pass

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.errors import InputError
 from postprocess import crossing_pairs, link_crossings
-from postprocess.measures.entanglement import entanglement
+from postprocess.measures.entanglement import entanglement, link_passages
 
 U = np.array([[-1.0, 2, 0], [-1, 0, 0], [1, 0, 0], [1, 2, 0]])
 
@@ -96,6 +96,9 @@ def pin(x, y, low=-1.0, high=1.0):
         (pin(0, 1, low=0.0), 0),  # ends in the plane
         (pin(0, 1, low=0.5), 0),  # ends short of it
         (np.array([[0.0, 1, 0], [0.5, 1, 0], [0.5, 1.5, 0], [0, 1.5, 0]]), 0),  # lies in it
+        (np.array([[0.0, 1, -1], [0, 1, 0], [0.2, 1, 1], [0.4, 1, 1]]), 1),  # passes with a hinge in the plane
+        (np.array([[0.0, 1, -1], [0, 1, 0], [0.2, 1, 0], [0.2, 1, 1]]), 1),  # with its middle link in the plane
+        (np.array([[0.0, 1, 1], [0, 1, 0], [0.2, 1, 1], [0.4, 1, 1]]), 0),  # its hinge touches the plane
     ],
 )
 def test_touching_is_not_passing(other, expected):
@@ -104,6 +107,13 @@ def test_touching_is_not_passing(other, expected):
     # Rounding must not decide: the same after a turn, and with A's vertices in reverse order.
     assert link_crossings(np.array([U, other]) @ turn.T)[0] == expected
     assert link_crossings([U[::-1], other])[0] == expected
+
+
+def test_a_passage_by_a_hinge_is_at_the_hinge():
+    passing = np.array([[0.0, 1, -1], [0.1, 1.2, 0], [0.2, 1, 1], [0.4, 1, 1]])
+    found = link_passages([U, passing])
+    assert (found.i.tolist(), found.j.tolist()) == ([0], [1])
+    assert found.point == pytest.approx(passing[1:2])
 
 
 def test_straight_smarticles_pass_but_are_skipped_in_the_mean(shape):

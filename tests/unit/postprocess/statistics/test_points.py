@@ -14,6 +14,7 @@ from postprocess.statistics.points import (
     format_with_error,
     mean_difference,
     means_by,
+    paired_differences,
     pairs,
     seeds_of,
 )
@@ -71,3 +72,24 @@ def test_runs_are_compared_pair_by_pair() -> None:
     assert pairs(one, other, FORCE)[["one", "other"]].to_numpy().tolist() == [[11, 10], [23, 20]]
     difference = mean_difference(one, other, FORCE)
     assert (difference.value, difference.standard_error, difference.count) == (2.0, pytest.approx(1.0), 2)
+
+
+def test_numbers_that_differ_by_rounding_are_one_group() -> None:
+    third = 0.1 + 0.2
+    runs = pd.DataFrame({"x": [third, 0.3, 0.4, third, math.nan], FORCE: [1.0, 3.0, 5.0, 2.0, 7.0]})
+    for column in (runs["x"], runs["x"].astype(object), -runs["x"]):
+        means = means_by(runs.assign(x=column), ["x"])
+        assert means["x"].abs().tolist()[:2] == [0.3, 0.4]
+        assert means["runs [-]"].tolist() == [3, 1, 1]
+        assert means[FORCE].tolist() == [2.0, 5.0, 7.0]
+    near = pd.DataFrame({"x": [0.3, 0.3000001], FORCE: [1.0, 3.0]})
+    assert len(means_by(near, ["x"])) == 2
+    assert runs["x"].tolist()[0] == third  # the table itself is unchanged
+    assert means_by(runs.iloc[:0], ["x"]).empty
+
+
+def test_pairs_of_a_factor_are_found_in_spite_of_rounding() -> None:
+    third = 0.1 + 0.2
+    runs = pd.DataFrame({"x": [third, 0.4, 0.3, 0.4], "y": [third, 0.3, 1.0, 1.0], FORCE: [1.0, 3.0, 5.0, 9.0]})
+    found = paired_differences(runs, FORCE, "x", (0.3, 0.4), ["y"])
+    assert found[FORCE].tolist() == [2.0, 4.0]

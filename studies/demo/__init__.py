@@ -1,0 +1,1 @@
+"""The runs of `make demo`, and what is said of them."""
