@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _MIN_RUNS_FOR_PROCESSES = 6  #: With fewer runs, loading the libraries in each process takes longer than it saves
 
+STATE, DONE = "state", "done"  #: Column with the state of a run, and the state of a finished run
 PHASE = ("phase", "phase type")  #: Columns that identify a phase within a run
 
 
@@ -53,6 +54,28 @@ def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
             raise InputError(msg)
         found |= with_frames
     return found
+
+
+def states(directories: Sequence[Path]) -> pd.DataFrame:
+    """Return a table of all runs in directories of runs and sweeps, with or without frames.
+
+    The columns are "run", "state", and the variables of the sweeps.
+    """
+    import pandas as pd  # noqa: PLC0415
+
+    from templates.sweep.folder import open_folder, run_status  # noqa: PLC0415
+
+    rows: list[Mapping[str, Any]] = []
+    for directory in directories:
+        if (directory / OF_SWEEP).is_file():
+            folder = open_folder(directory)
+            found = {folder.run(entry): entry.values for entry in folder.entries}
+        else:
+            found = {directory: {}}
+        for run, values in found.items():
+            cells = {name: _cell(value) for name, value in values.items()}
+            rows.append({**cells, "run": str(run), STATE: run_status(run).state})
+    return pd.DataFrame(rows)
 
 
 def values_in(folder: Folder) -> dict[str, list[Any]]:
@@ -96,8 +119,9 @@ def measured(
         progress: function that is called after each measured run.
 
     Returns:
-        One table of all runs, with units in the column names. The variables of a sweep follow the first column, `run`.
-        A variable is called "NAME (swept)" if there is a measured column NAME with other values.
+        One table of all runs, with units in the column names. The variables of a sweep follow the first column, `run`;
+        then comes `state`, see `dem.record.run.State`. A variable is called "NAME (swept)" if there is a measured
+        column NAME with other values.
 
     Raises:
         InputError: a sweep has no run with frames yet, or a file is missing or damaged.
@@ -144,16 +168,23 @@ def _measure_and_keep(
 
 
 def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFrame:
-    """Insert the variables of a run's sweep (`values` by name) after the first column of its table."""
+    """Insert the variables of a run's sweep (`values` by name) and its state after the first column of its table."""
+    from dem.record.run import Run  # noqa: PLC0415
+
+    table.insert(1, STATE, Run(Path(table["run"].iloc[0])).status.state)
     for place, (name, value) in enumerate(values.items(), start=1):
-        column = name
-        cell = value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
+        column, cell = name, _cell(value)
         if name in table.columns and (table[name] == cell).all():
             table = table.drop(columns=name)  # inserted again below
         elif name in table.columns:
             column = f"{name} (swept)"
         table.insert(place, column, [cell] * len(table))
     return table
+
+
+def _cell(value: Any) -> Any:
+    """Return the value of a variable as a cell of a table; mappings and lists become JSON."""
+    return value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
 
 
 def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
@@ -168,15 +199,65 @@ def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
     return table[table["phase type"] == phase].reset_index(drop=True)
 
 
-def grouped(table: pd.DataFrame, by: Sequence[str], *, intervals: bool = False) -> pd.DataFrame:
+def grouped(
+    table: pd.DataFrame,
+    by: Sequence[str],
+    *,
+    runs: pd.DataFrame | None = None,
+    intervals: bool = False,
+    unfinished: bool = False,
+) -> pd.DataFrame:
     """Average a table of `measured`, phase by phase, over runs with equal values in the columns `by`.
 
-    The result has standard errors "… SE […]" and, with `intervals`, half-widths "… 95 % […]" of confidence intervals.
+    Args:
+        table: table of `measured`, with one row per run and phase.
+        by: columns whose values define the groups.
+        runs: table of `states`, to count runs without frames too; None: runs of `table` alone.
+        intervals: add half-widths "… 95 % […]" of confidence intervals.
+        unfinished: average over unfinished runs too. Their last phase may be incomplete.
+
+    Returns:
+        The table of `means_by`. Its column `state` counts the finished runs of a group, such as "3 of 12 finished".
     """
-    from postprocess.statistics.points import means_by  # noqa: PLC0415
+    from postprocess.statistics.points import RUNS, means_by, together  # noqa: PLC0415
 
     for name in by:
         if name not in table.columns:
             known = [str(column) for column in table.columns if not str(column).endswith("]")]
-            raise InputError(f"{name!r} is no column of these runs; {nearest(name, known)}")
-    return means_by(table, [*by, *(name for name in PHASE if name not in by)], intervals=intervals)
+            raise InputError(f"the tables of these runs have no column {name!r}; {nearest(name, known)}")
+    keys, table = [*by, *(name for name in PHASE if name not in by)], together(table, by)
+    averaged = table if unfinished else table[table[STATE] == DONE]
+    # Groups without a finished run keep their row.
+    means = table[keys].drop_duplicates(ignore_index=True)
+    if averaged.empty:
+        means[RUNS] = 0
+    else:
+        found = means_by(averaged, keys, intervals=intervals).astype(means.dtypes.to_dict())
+        means = means.merge(found, on=keys, how="left").copy()  # in one block, else pandas warns at `insert`
+        means[RUNS] = means[RUNS].fillna(0).astype(int)
+    if STATE not in by:
+        means.insert(means.columns.get_loc(RUNS) + 1, STATE, _finished(means, table, by, runs))
+    return means
+
+
+def group_columns(means: pd.DataFrame, by: Sequence[str]) -> list[str]:
+    """Return the columns of a table of `grouped` that identify a row; `state` only if a group has unfinished runs."""
+    from postprocess.statistics.points import RUNS  # noqa: PLC0415
+
+    complete = STATE in by or all(len(set(text.split()[:3:2])) == 1 for text in means[STATE])
+    return [*by, RUNS, *([] if complete else [STATE])]
+
+
+def _finished(means: pd.DataFrame, table: pd.DataFrame, by: Sequence[str], runs: pd.DataFrame | None) -> Sequence[str]:
+    """Return, for each row of `means`, how many runs of its group are finished, such as "3 of 12 finished"."""
+    from dem.strict import equal  # noqa: PLC0415  (pydantic)
+
+    named = [name for name in by if name not in PHASE]
+    counted = runs if runs is not None and set(named) <= set(runs.columns) else table.drop_duplicates(["run", *named])
+    texts = []
+    for values in means[named].to_dict("records"):
+        of_group = counted
+        for name, value in values.items():
+            of_group = of_group[[equal(one, value) for one in of_group[name]]]
+        texts.append(f"{(of_group[STATE] == DONE).sum()} of {len(of_group)} finished")
+    return texts

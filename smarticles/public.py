@@ -33,7 +33,7 @@ from dem.yaml_text import load_yaml, read_text
 from postprocess.measures.registry import FrameMeasure, Values, measure_of
 from smarticles.labelled import dataset_of
 from smarticles.main import BAD_INPUT
-from smarticles.measuring import grouped, measured, of_phase, values_in
+from smarticles.measuring import grouped, measured, of_phase, states, values_in
 from smarticles.notebook import show_sweep
 from smarticles.sweeps import compute, make_folder, raise_failures
 from templates.local import environment, smarticles_command
@@ -108,6 +108,7 @@ class SweepDirectory(Sequence[Run]):
         self,
         *,
         by: str | Sequence[str] | None = None,
+        unfinished: bool = False,
         frames: bool = False,
         also: Sequence[str] = (),
         measures: Sequence[OwnMeasure] = (),
@@ -116,8 +117,10 @@ class SweepDirectory(Sequence[Run]):
         """Return the measures of all runs that have frames, with the sweep's variables as columns.
 
         Args:
-            by: columns, such as variables of the sweep. The result is then averaged over runs with equal values in
-                these columns; columns "… SE […]" have the standard errors over runs.
+            by: columns, such as variables of the sweep. The result is then averaged over finished runs with equal
+                values in these columns; columns "… SE […]" have the standard errors over runs. The column `state`
+                states how many runs of a group are finished.
+            unfinished: with `by`, average over unfinished runs too.
             frames: return one row per frame; cannot be combined with `by`.
             also: names of measures that tables have on request alone, such as "crossing-number".
             measures: further measures; a function of a frame and its run returns a number, an array of numbers or a
@@ -128,12 +131,20 @@ class SweepDirectory(Sequence[Run]):
             One row per run and phase, per group and phase with `by`, or per frame. Column names contain the units.
 
         Raises:
-            InputError: no run has frames yet, a column does not exist, or `by` and `frames` are combined.
+            InputError: no run has frames yet, a column does not exist, `by` and `frames` are combined, or `unfinished`
+                is given without `by`.
         """
+        if unfinished and by is None:
+            raise InputError(
+                "unfinished: is for means over runs; give by, or leave it out: without by all runs are listed"
+            )
         if by is not None and frames:
             raise InputError("by: averages over phases of runs; leave frames out")
         table = measured([self.path], frames=frames, also=_names(also), measures=_measures(measures), jobs=jobs)
-        return table if by is None else grouped(table, [by] if isinstance(by, str) else list(by))
+        if by is None:
+            return table
+        names = [by] if isinstance(by, str) else list(by)
+        return grouped(table, names, runs=states([self.path]), unfinished=unfinished)
 
     def to_xarray(
         self,
@@ -262,7 +273,7 @@ def measure(
     Args:
         run: run, or its directory.
         frames: return one row per frame.
-        also: names of measures that tables have on request alone, such as "crossing-number".
+        also: names of further measures, which take long or are seldom needed, such as "crossing-number".
         measures: further measures; a function of a frame and its run returns a number, an array of numbers or a dict of
             these. Names of functions and of the dict's keys end with the unit: `top_m` makes the column `top [m]`.
 

@@ -1,4 +1,4 @@
-"""Accuracy and cost of one scene, by variants that each change one numerical parameter (a "knob").
+"""Accuracy and cost of one scene, by variants that each change one numerical parameter (`knob` in tables).
 
 A knob has several values, its "rungs", from coarse to fine. The scene itself is the variant `base`; it is a rung of
 every knob, and is run once. Errors are relative to the reference of a knob: its finest rung with finished runs. Knobs
@@ -170,9 +170,9 @@ def parse_knobs(text: str) -> tuple[str, ...]:
     words = [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
         if word not in KNOBS:
-            raise InputError(f"--knobs: {word!r} is no knob; {nearest(word, KNOBS)}")
+            raise InputError(f"--parameters: {word!r} does not exist; {nearest(word, KNOBS)}")
     if not words:
-        raise InputError(f"--knobs {text!r}: names none; known: {', '.join(KNOBS)}")
+        raise InputError(f"--parameters {text!r}: names none; known: {', '.join(KNOBS)}")
     return tuple(knob for knob in KNOBS if knob in words)
 
 
@@ -198,12 +198,14 @@ def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = Non
     elif scene.fidelity.time_step_s is not None:
         msg = (
             f"{source}: fidelity.time_step_s: a fixed step of {scene.fidelity.time_step_s:g} s does not follow the "
-            "knobs; give fidelity.time_step_fraction instead"
+            "parameters; give fidelity.time_step_fraction instead"
         )
     elif idle is not None:
-        msg = f"--knobs: {idle} changes nothing: no phase of {source} moves barbs ({', '.join(types)}); leave it out"
+        msg = (
+            f"--parameters: {idle} changes nothing: no phase of {source} moves barbs ({', '.join(types)}); leave it out"
+        )
     elif scene.smooth and "hinge" in (knobs or ()):
-        msg = f"--knobs: hinge changes nothing: the engine {scene.engine} has no pins; leave it out"
+        msg = f"--parameters: hinge changes nothing: the engine {scene.engine} has no pins; leave it out"
     if msg:
         raise InputError(msg)
     useless = {"engine", *(() if driven else _OF_MOTORS), *(["hinge"] if scene.smooth else [])}
@@ -666,7 +668,7 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
             form="+.1f",
             bar="95 %",
             axis=f"error of {symbol} [%]",
-            meaning=f"of {symbol} against the knob's reference",
+            meaning=f"of {symbol} against the parameter's reference",
         )
         for name, symbol in SYMBOLS.items()
     ]
@@ -675,7 +677,7 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
         title="What accuracy costs in time",
         measure=partial(measure, expected_s=expected_s),
         keys=(
-            Key(column=KNOB, label="knob"),
+            Key(column=KNOB, label="parameter"),
             Key(column=VALUE, label="value"),
             Key(column=UNIT, label="unit"),
             Key(column=VARIANT, label="setting"),
@@ -707,11 +709,11 @@ def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyT
         remarks=(
             f"φ by {DEFINITION} ({DEFINITIONS[DEFINITION]}); φ_0 and h_0, the height of the centre of mass, before the "
             f"first activity, φ_f and ⟨N⟩ at the end of the last one, means over {LAST_FRAMES} frames or fewer.",
-            "Errors are relative to the knob's reference (its finest rung with finished runs, or the scene itself for "
-            "a sensitivity), their bands 95 % by Student's t, with the scatter from seed to seed pooled over all "
-            "settings. Where a knob changes nothing at all, one error in twenty is still beyond its band.",
+            "Errors are relative to the parameter's reference (its finest rung with finished runs, or the scene itself "
+            "for a sensitivity), their bands 95 % by Student's t, with the scatter from seed to seed pooled over all "
+            "settings. Where a parameter changes nothing at all, one error in twenty is still beyond its band.",
         ),
-        reference=Reference(statement="the finest rung of each knob", facts={"knobs": " ".join(knobs)}),
+        reference=Reference(statement="the finest rung of each parameter", facts={"parameters": " ".join(knobs)}),
     )
 
 

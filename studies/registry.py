@@ -91,6 +91,28 @@ def _scripts() -> list[Script]:
 STUDIES: Mapping[str, Script] = MappingProxyType({study.name: study for study in _scripts()})  #: All studies by name
 
 
+def study_of(files: Mapping[str, str]) -> tuple[Script, bool] | None:
+    """Find the shipped study that a sweep is, by the texts of its files; None if it is none.
+
+    Args:
+        files: texts of the sweep file and its template by file name, as in the manifest of a sweep.
+
+    Returns:
+        The study, and whether the sweep is its quick variant.
+    """
+    from templates.sweep.sweep_file import load_sweep  # noqa: PLC0415
+
+    for study in STUDIES.values():
+        for quick in (False, True) if study.quick else (False,):
+            file = study.sweep_file(quick=quick)
+            if file.name not in files:
+                continue
+            sweep = load_sweep(file)
+            if (files[file.name], files.get(sweep.content.template)) == (sweep.text, sweep.template_text):
+                return study, quick
+    return None
+
+
 def shipped(name: str) -> Script:
     """Return the shipped study with a name; InputError if there is none."""
     if name not in STUDIES:

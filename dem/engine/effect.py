@@ -64,13 +64,17 @@ class Adds:
         }
         return Adds(**lists, python="; ".join(part.python for part in each if part.python))
 
-    def to_text(self) -> str:
+    def to_text(self, *, internals: bool = True) -> str:
         """Return a line that describes the additions; "" if there are none.
 
         Engines, materials, shapes and files are named; functors, datasets and arrays are counted; `python` comes last.
+        Without `internals` the line leaves out what is in the engine's own terms.
         """
-        named = {"engines": self.engines, "materials": self.materials, "bodies": self.shapes, "files": self.files}
-        counted = {"functors": self.functors, "datasets": self.series, "arrays per frame": self.arrays}
+        named = {"files": self.files}
+        counted = {"datasets": self.series, "arrays per frame": self.arrays}
+        if internals:
+            named = {"engines": self.engines, "materials": self.materials, "bodies": self.shapes, **named}
+            counted = {"functors": self.functors, **counted}
         parts = [f"{what} {', '.join(names)}" for what, names in named.items() if names]
         parts += [f"{len(names)} {what}" for what, names in counted.items() if names]
         return "; ".join(filter(None, [*parts, self.python]))

@@ -154,7 +154,7 @@ def read_table(
     except (TypeError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"--table {file}: a row of knob fidelity does not hold numbers ({error}); {_HOW}") from None
+        raise InputError(f"--table {file}: a row of fidelity does not hold numbers ({error}); {_HOW}") from None
 
 
 def _named_fidelities(rows: Sequence[dict[str, str]]) -> dict[tuple[str, str], dict[str, str]]:

@@ -158,7 +158,8 @@ def _plane(scene: Scene) -> tuple[bool, str]:
 def _motors(scene: Scene, numbers: list[str]) -> dict[EffectName, tuple[bool, str]]:
     if not scene.actuates:
         off = (False, "no phase actuates")
-        welded = (False, f"{off[1]}; each smarticle is one welded clump")
+        what = "each smarticle is one rigid body" if scene.particle is None else "only smarticles have barbs"
+        welded = (False, f"{off[1]}; {what}")
         return {EffectName.ARTICULATION: welded, EffectName.MOTORS: off, EffectName.TORQUE_CAP: off}
     motor, fidelity, share = scene.motor, scene.fidelity, overshoot(scene)
     beyond = f", exceeded by up to {share:.2g} τ_max between control updates" if share else ""

@@ -149,6 +149,20 @@ class Manifest(Document):
         """Return whether, in phase number `phase`, the pile is in a cylinder and has a packing fraction."""
         return self.container_tiers == 1 and self.walled(phase)
 
+    def held(self, phase: int) -> bool:
+        """Return whether grips or a raised hook may bear bodies in phase number `phase`.
+
+        Grips hold until a `release` or the end of a `tension`; a hook that has been raised stays up.
+        """
+        types = [record.type for record in self.phases[: phase + 1]]
+        grips = [kind for kind in types if kind in ("lift", "release", "tension")]
+        return "pull-hook" in types or types[-1] == "tension" or grips[-1:] == ["lift"]
+
+    def dropped(self, phase: int) -> bool:
+        """Return whether bodies that grips have released may still fall in phase number `phase`."""
+        before = next((record.type for record in self.phases[phase::-1] if not record.at_rest), None)
+        return before in ("release", "tension") and not self.held(phase)
+
 
 class Done(Document):
     """Times and cost of a run that is done: the content of `done.json`, the last file that a run writes."""

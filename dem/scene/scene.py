@@ -107,7 +107,7 @@ class Scene(Part, Shown):
     gravity_m_per_s2: float = Field(EARTH_GRAVITY, ge=0, le=1000, description="g, downwards [m/s²]; 0 or from 1e-6")
     fidelity: Fidelity = Field(
         default_factory=lambda given: Fidelity(base="standard", **_named("standard", given)),
-        description="a name (draft, standard, reference) or a mapping: base and the knobs that differ from it",
+        description="a name (draft, standard, reference) or a mapping: base and the parameters that differ from it",
     )
     phases: tuple[AnyPhase, ...] = Field(..., min_length=1, description="phases of the run, in order")
     recording: Recording = Field(default_factory=Recording, description="frames and series")

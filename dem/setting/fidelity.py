@@ -1,4 +1,4 @@
-"""Knobs, the numerical parameters that trade accuracy for cost, and named sets of their values."""
+"""Numerical parameters that trade accuracy for cost, and named sets of their values."""
 
 from collections.abc import Mapping
 from typing import Any, Literal
@@ -9,10 +9,10 @@ from dem.setting.part import Length, Part, Stiffness
 
 
 class Fidelity(Part):
-    """Numerical parameters (knobs) that trade accuracy for cost; none of them changes mass or inertia."""
+    """Numerical parameters that trade accuracy for cost; none of them changes mass or inertia."""
 
     base: Literal["draft", "standard", "reference"] = Field(
-        "standard", description="named fidelity that gives the default of all other knobs"
+        "standard", description="named fidelity that gives the default of all other parameters"
     )
     rows: int = Field(..., ge=1, le=4, description="rows of spheres across t1, the thickness along the normal [1]")
     diameter_m: Length | None = Field(

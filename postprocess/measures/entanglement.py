@@ -374,7 +374,7 @@ MEASURES = (
         place=40,
         quantities=(
             Quantity("crossings mean", "-", Shown(heading="⟨N⟩", place=20, form=".2f")),
-            Quantity("planes", "-"),
+            Quantity("smarticles with a plane", "-"),
         ),
         take=_entanglement_of,
         available_for=rigid_in_space,

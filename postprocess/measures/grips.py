@@ -3,8 +3,8 @@
 The pull is the force with which other bodies, floor and wall hold back the bodies of the moving grip. The pull on the
 resting grip is their force on its bodies, in the direction in which the other grip moves; along z it includes the push
 of the floor. The strain is the elongation over the distance between the grips at the beginning, each at the mean of the
-centres of mass of its bodies. What a grip has picked up is the weight that it bears, gripped bodies included, over the
-weight of one body.
+centres of mass of its bodies. What a grip has picked up is the mass whose weight it bears, gripped bodies included; as
+a number of bodies, it is divided by the mean mass of one.
 """
 
 from dataclasses import dataclass
@@ -75,8 +75,10 @@ def _of_lift(run: Run, series: Series, phase: int) -> tuple[float, ...]:
     inside = series.known("elongation_m", phase)
     inside = inside[np.isfinite(series["grip_moved_force_N"][inside, 2])]
     last = inside[series.time[inside] > series.time[inside[-1]] - END]
-    held = float(series["grip_moved_count"][last[-1]])
-    return held, held - float(series["grip_moved_force_N"][last, 2].mean()) / weight_of_one(run)
+    gripped = float(series["grip_moved_count"][last[-1]])
+    picked = gripped - float(series["grip_moved_force_N"][last, 2].mean()) / weight_of_one(run)
+    mass = run.manifest.smarticle_mass_kg
+    return gripped, gripped * mass, picked, picked * mass
 
 
 MEASURES = (
@@ -86,7 +88,11 @@ MEASURES = (
         quantities=(
             Quantity("peak pull over n W_s", "-", Shown(heading="peak F/nW", place=45, form=".3f")),
             Quantity("strain at the peak pull", "-", Shown(heading="strain at it", place=46, form=".3f")),
-            Quantity("pull on the resting grip at the peak over n W_s", "-"),
+            Quantity(
+                "pull on the resting grip at the peak over n W_s",
+                "-",
+                Shown(heading="resting F/nW", place=45, form=".3f"),
+            ),
             Quantity("work of the pull", "J", Shown(heading="work of the pull [mJ]", place=47, form=".3g", factor=1e3)),
             Quantity("pull held fast", "-"),
         ),
@@ -98,7 +104,9 @@ MEASURES = (
         phases=(LIFT,),
         quantities=(
             Quantity("gripped", "smarticles"),
+            Quantity("gripped mass", "kg"),
             Quantity("picked up", "smarticles", Shown(heading="picked up", place=48, form=".1f")),
+            Quantity("picked up mass", "kg", Shown(heading="picked up [kg]", place=48, form=".3g")),
         ),
         take=_of_lift,
         available_for=has_grips,

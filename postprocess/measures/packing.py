@@ -19,6 +19,7 @@ from postprocess.geometry.links import UndefinedMeasureError, Vertices, checked_
 from postprocess.geometry.voronoi import local_packing
 from postprocess.geometry.voxel import Region, solid_fraction
 from postprocess.measures.heights import frame_heights, heights, material_height
+from postprocess.measures.pile import why_no_pile
 from postprocess.measures.registry import FrameMeasure, Quantity, Shown, any_in_space, in_space
 
 DEFINITIONS: Mapping[str, str] = MappingProxyType(
@@ -110,8 +111,11 @@ def packing_fraction(
 
 
 def packing_of(frame: Frame, run: Run, *, definition: str) -> float:
-    """Return the packing fraction [-] of a frame by a key of `DEFINITIONS`; NaN if it is undefined."""
-    if not run.manifest.fills_cylinder(frame.phase):
+    """Return the packing fraction [-] of a frame by a key of `DEFINITIONS`; NaN if it is undefined.
+
+    It is undefined where `why_no_pile` has a reason, and for a pile without height.
+    """
+    if why_no_pile(frame, run):
         return math.nan
     # The costly definitions use an inner cylinder, to which a corrected radius does not apply.
     radius = run.manifest.container_radius_m if definition in COSTLY_DEFINITIONS else run.manifest.measured_radius_m
@@ -136,7 +140,7 @@ def _packing_of_bars(frame: Frame, run: Run, *, definition: str, radius: float) 
 
     `definition` is a key of `DEFINITIONS`; `radius` is that of the cylinder [m].
     """
-    if definition in COSTLY_DEFINITIONS or frame.count < 2:
+    if definition in COSTLY_DEFINITIONS:
         return math.nan
     levels = frame_heights(frame, run)
     height = levels.second_highest_com if definition == "second-highest-com" else levels.top
@@ -149,9 +153,14 @@ def _packing(definition: str, frame: Frame, run: Run) -> tuple[float]:
     return (packing_of(frame, run, definition=definition),)
 
 
-# Experiments use the first definition: short tables call it φ and show its error.
+HEADINGS: Mapping[str, str] = MappingProxyType(
+    {"second-highest-com": "φ", "top-percentile": "φ top 95 %", "voxel": "φ voxel", "voronoi": "φ Voronoi"}
+)
+"""Headings of the definitions in short tables; the first is the one that experiments use."""
+
+# Short tables show the error of the first definition alone.
 _SHOWN = {
-    name: Shown(heading="φ" if place == 0 else name, place=10 + place, form=".4f", with_error=place == 0)
+    name: Shown(heading=HEADINGS[name], place=10 + place, form=".4f", with_error=place == 0)
     for place, name in enumerate(DEFINITIONS)
 }
 

@@ -229,7 +229,7 @@ def frame_measures(definitions: Sequence[str], also: Collection[str] = ()) -> tu
     asked = {m.name: m for m in registered() if isinstance(m, FrameMeasure) and m.on_request}
     for name in also:
         if name not in asked:
-            raise InputError(f"also: {name!r} is no measure on request; {nearest(name, asked)}")
+            raise InputError(f"also: there is no measure {name!r} to add; {nearest(name, asked)}")
     known = sorted(
         (m for m in registered() if isinstance(m, FrameMeasure) and not (m.on_request and m.name not in also)),
         key=lambda measure: measure.place,

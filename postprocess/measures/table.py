@@ -9,10 +9,12 @@ import pandas as pd
 
 from dem.errors import InputError
 from dem.record.columns import EVERY
+from dem.record.frame import Frame
 from dem.record.frames import FrameSequence
 from dem.record.run import Run
 from dem.record.series import Series
 from postprocess.measures.packing import DEFINITIONS
+from postprocess.measures.pile import POUR, settled
 from postprocess.measures.registry import FrameMeasure, frame_measures, phase_measures
 from postprocess.statistics.points import ASPECT, SEED, marked
 from postprocess.statistics.seeds import mean_with_error
@@ -83,7 +85,8 @@ def summarise_run(
 
     Returns:
         A table with one row per phase and units in its column names. A column "… SE" follows each mean with its
-        standard error, see `seeds.mean_with_error`. "frames averaged" is the number of frames. By default costly
+        standard error, see `seeds.mean_with_error`. "frames averaged" is the number of frames. Of a pour, only frames
+        of the settled pile are averaged; if there is none, the number is 0 and all means are NaN. By default costly
         measures are computed for the last frame alone and have no error.
 
     Raises:
@@ -97,11 +100,12 @@ def summarise_run(
         if phases is not None and part[0].phase not in phases:
             continue
         known = (*frame_measures(definitions, also), *measures)
-        table = pd.DataFrame(_rows(part[-last:], run, series, known, costly))
+        chosen = _averaged(part[-last:], run)
+        table = pd.DataFrame(_rows(chosen or part[-1:], run, series, known, costly if chosen else "never"))
         summary = {name: table[name].iloc[-1] for name in (*_LABELS, "phase", "phase type", "time [s]")}
-        summary["frames averaged"] = len(table)
+        summary["frames averaged"] = len(chosen)
         for name in table.columns.difference([*summary, "frame"], sort=False):
-            mean = mean_with_error(table[name])
+            mean = mean_with_error(table[name] if chosen else [])
             summary |= {name: mean.value, marked(name, "SE"): mean.standard_error}
         if series is not None:
             for measure in phase_measures():
@@ -157,8 +161,15 @@ def _frames_by_phase(run: Run, frames: FrameSequence) -> list[FrameSequence]:
     return [part for part in parts if part]
 
 
+def _averaged(part: FrameSequence, run: Run) -> Sequence[Frame]:
+    """Return the frames at the end of a phase that its means average: of a pour, those of the settled pile."""
+    if run.phases[part[0].phase].type != POUR:
+        return part
+    return [frame for frame in part if settled(frame, run)]
+
+
 def _rows(
-    part: FrameSequence,
+    part: Sequence[Frame],
     run: Run,
     series: Series | None,
     known: Sequence[FrameMeasure],

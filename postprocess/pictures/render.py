@@ -17,6 +17,7 @@ from postprocess.bodies.colours import ColourScale, Paint, Span, span
 from postprocess.geometry.links import Floats, plane_frames
 from postprocess.measures.entanglement import entanglement, has_plane, link_passages
 from postprocess.measures.packing import packing_of
+from postprocess.measures.pile import why_no_pile
 from postprocess.pictures import film
 from postprocess.pictures.canvas import (
     MILLIMETRE,
@@ -365,10 +366,4 @@ def packing_text(frame: Frame, run: Run) -> str:
     value = packing_of(frame, run, definition=DEFINITION)
     if math.isfinite(value):
         return f"φ = {value:.4f} ({DEFINITION})"
-    if run.manifest.container_tiers > 1:
-        return f"no φ: a mould of {run.manifest.container_tiers} tiers"
-    if not run.manifest.walled(frame.phase):
-        return "no φ: no wall"
-    if frame.count < 2:
-        return "no φ: fewer than 2 smarticles"
-    return "no φ: the pile has no height"
+    return f"no φ: {why_no_pile(frame, run) or 'the pile has no height'}"

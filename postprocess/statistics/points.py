@@ -25,6 +25,11 @@ def marked(quantity: str, mark: str) -> str:
     return f"{name} {mark} [{unit}"
 
 
+def counted(quantity: str) -> str:
+    """Return the name of the column with the number of values in the mean of a quantity: `hook work n [-]`."""
+    return f"{quantity.rpartition(' [')[0]} n [-]"
+
+
 def mean_columns(quantity: str, mean: SeedMean) -> dict[str, float]:
     """Return the columns of a mean over seeds: `phi [-]`, `phi SE [-]` and the half-width `phi 95 % [-]`."""
     return {
@@ -75,7 +80,8 @@ def means_by(table: pd.DataFrame, by: Sequence[str], *, intervals: bool = False)
 
     Returns:
         One row per group, in the order of its first row: the columns `by`, `RUNS`, then each quantity with its standard
-        error "… SE […]", NaN for a single run. Values of NaN are left out of the means.
+        error "… SE […]", NaN for a single run. Values of NaN are left out of the means. A quantity with means of fewer
+        rows than `RUNS` has a column "… n [-]" with the number of values, see `counted`.
 
     Example:
         >>> runs = pd.DataFrame({"friction": [0.2, 0.2, 0.4], "phi [-]": [0.1, 0.3, 0.5]})
@@ -85,14 +91,18 @@ def means_by(table: pd.DataFrame, by: Sequence[str], *, intervals: bool = False)
     table = together(table, by)
     numbers = table.select_dtypes(["number", "bool"]).columns
     quantities = [name for name in numbers if name.endswith("]") and name not in (*by, ASPECT) and " SE [" not in name]
-    rows = []
-    for values, group in table.groupby(list(by), sort=False, dropna=False):
+    groups, rows = table.groupby(list(by), sort=False, dropna=False), []
+    some = groups[quantities].count()
+    incomplete = some.columns[((some > 0) & some.lt(groups.size(), axis=0)).any()]
+    for values, group in groups:
         row: dict[str, object] = {**dict(zip(by, values, strict=True)), RUNS: len(group)}
         for name in quantities:
             columns = mean_columns(name, mean_over_seeds(group[name]))
             if not intervals:
                 del columns[marked(name, "95 %")]
             row |= columns
+            if name in incomplete:
+                row[counted(name)] = int(group[name].notna().sum())
         rows.append(row)
     return pd.DataFrame(rows)
 

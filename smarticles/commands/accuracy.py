@@ -22,10 +22,10 @@ def add(commands: Commands) -> None:
     accuracy = commands.add(
         "accuracy",
         run_accuracy,
-        summary="measure error against wall time: one scene at several settings of each knob",
+        summary="measure error against wall time: one scene at several values of each parameter",
         text="""
-Runs variants of a scene, the *ladder*. Each variant changes one knob, and is run with several seeds.
-The output compares errors with wall times. Knobs:
+Runs variants of a scene, the *ladder*. Each variant changes one numerical parameter, and is run with
+several seeds. The output compares errors with wall times. Parameters:
 
   time-step    time step over the stable time step: 0.9, 0.45, 0.225
   stiffness    contact stiffness: ×1, ×2, ×4, with the time step that it requires; on links 125 to 4000 N/m
@@ -35,9 +35,9 @@ The output compares errors with wall times. Knobs:
   control      time between two control updates of the motors: 4e-4, 2e-4, 1e-4 s; scenes that actuate
   hinge        stiffness of the hinges' pins: ×1, ×2, ×4; scenes that actuate, on YADE alone
   fidelity     draft, standard, reference; on links also converged, which is finer
-  engine       the named fidelities of links and YADE against converged on links; only if named in --knobs
+  engine       the named fidelities of links and YADE against converged on links; only if named in --parameters
 
-The unchanged scene is one setting of every knob and is run once. The reference of a knob is its finest
+The unchanged scene is one setting of every parameter and is run once. The reference of a parameter is its finest
 setting with finished runs. An error smaller than the scatter between seeds is reported as not resolved;
 more seeds reduce the scatter. If the command is repeated with more --seeds, only the new runs start.
 
@@ -47,7 +47,7 @@ prints the progress.""",
         examples="""\
   smarticles accuracy scene.yaml --out ladder --dry-run
   smarticles accuracy scene.yaml --out ladder
-  smarticles accuracy scene.yaml --out ladder --knobs fidelity --seeds 1,2,3,4,5
+  smarticles accuracy scene.yaml --out ladder --parameters fidelity --seeds 1,2,3,4,5
   smarticles accuracy scene.yaml --out ladder --max-run-hours 1     omit slower settings
   smarticles accuracy scene.yaml --out ladder --analyse             analyse the finished runs
 """,
@@ -57,7 +57,13 @@ prints the progress.""",
     accuracy.add_argument(
         "--seeds", metavar="1,2,…", help="seeds of each setting, e.g. 1,2,5 or 1-20; default: 1,2,3, on links 1-20"
     )
-    accuracy.add_argument("--knobs", metavar="NAME,…", help="knobs to change; default: all that affect the scene")
+    accuracy.add_argument(
+        "--parameters",
+        "--knobs",  # the name of earlier versions, in commands of published results
+        dest="knobs",
+        metavar="NAME,…",
+        help="parameters to change; default: all that affect the scene",
+    )
     accuracy.add_argument(
         "--max-run-hours",
         type=positive_number,
@@ -98,7 +104,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
         folder,
         arguments,
         partial(accuracy.study, ladder.rungs, {entry.name: entry.expected_s for entry in folder.entries}),
-        note=f"knobs {', '.join(ladder.knobs)} of {arguments.scene}{left_out}",
+        note=f"parameters {', '.join(ladder.knobs)} of {arguments.scene}{left_out}",
         pictured={"setting": accuracy.BASE},
     )
 
@@ -116,7 +122,7 @@ def _listing(ladder: Ladder, expected_s: Mapping[str, float], seeds: int, jobs: 
         section = f"{planned.most_strands} strands" if planned.strands else f"{planned.spheres_per_smarticle} spheres"
         shape = [planned.time_step_s, section]
         rows.append([rung.knob, rung.label, rung.setting, note, *shape, round(expected_s[rung.setting])])
-    header = ["knob", "value", "setting", "", "time step s", "section", "expected wall s"]
+    header = ["parameter", "value", "setting", "", "time step s", "section", "expected wall s"]
     runs = seeds * len(ladder.settings)
     hours = seeds * sum(expected_s[setting] for setting in ladder.settings) / 3600
     slots = min(jobs or usable_cores(), runs)

@@ -58,7 +58,7 @@ def add(commands: Commands) -> None:
         export_run,
         summary="write a run for ParaView, OVITO, Blender, 3D printers or an archive, or a scene for LAMMPS",
         text=f"""
-Writes the boxes of all links, and wall, tiers, floor, hooks, plate and strings at one time, in metres.
+Writes the boxes or cylinders of all links, and wall, tiers, floor, hooks, plate and strings at one time, in metres.
 Existing files are never replaced. Formats:
 
   vtp        folder for ParaView with all fields below; run `paraview --script=show_in_paraview.py`
@@ -78,7 +78,7 @@ Bodies: smarticles, wall, floor, hooks, plate, strings. --with crossings adds a 
 where a link passes through another smarticle's plane. --with forces adds lines through the contacts,
 for runs with recording.contact_forces.
 
-Fields of each box:
+Fields of each box or cylinder:
 {_FIELDS}""",
         examples="""\
   smarticles export runs/a --to glb                        last frame, runs/a/export.glb

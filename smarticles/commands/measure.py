@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Container, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
@@ -12,12 +12,11 @@ from dem.display import progress_of
 from dem.errors import InputError
 from dem.terminal import screen_width, warn
 from smarticles.command_line import Cell, Commands, add_options, as_json, column_blocks, names, reject_existing
-from smarticles.measuring import PHASE, grouped, measured, of_phase, sources
+from smarticles.measuring import DONE, STATE, group_columns, grouped, measured, of_phase, sources, states
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_COMPARED = "second-highest-com"
 _WIDTH = 100  # most characters of a line of the legend
 _Column = tuple[str, str, str, float]  #: Heading, column of the full table, number format, unit conversion factor
 _ALWAYS = (("phase", "phase type", "", 1.0), ("t [s]", "time [s]", ".2f", 1.0))
@@ -40,10 +39,10 @@ Reads the frames (VTK) and series (HDF5) of finished, failed and running simulat
 row per phase: means over the last frames of the phase, with standard errors (SE). The packing
 fraction φ is given by several definitions; the column names the definition. Phases with a plate, grips,
 a hook or strings have columns for forces. If DIR is a sweep, all its runs with frames are measured, and
-CSV and JSON have a column for each variable of the sweep. --by averages over all runs that have
-equal values in some columns, for example over seeds. --also adds measures that take long or that few
-need: crossing-number, closed-linking, orientation, caging. Tables are kept in the run directories, so
-that runs which have not changed are not measured again.""",
+CSV and JSON have a column for each variable of the sweep and one for the state of the run. --by averages
+over all finished runs that have equal values in some columns, for example over seeds. --also adds measures
+that take long or that few need: crossing-number, closed-linking, orientation, caging. Tables are kept in
+the run directories, so that runs which have not changed are not measured again.""",
         examples="""\
   smarticles measure runs/a
   smarticles measure runs/a runs/b --table phases.csv
@@ -53,7 +52,7 @@ that runs which have not changed are not measured again.""",
   smarticles measure friction --by friction                 means ± SE over the runs of each value
   smarticles measure friction --by friction --phase last    of the last phase of each run alone
   smarticles measure runs/a --profile profile.csv           φ(r, z) at the end of each phase
-  smarticles measure runs/a --also crossing-number,caging   measures on request
+  smarticles measure runs/a --also crossing-number,caging   further measures
 """,
     )
     measure.add_argument("directories", nargs="+", type=Path, metavar="DIR", help="runs or sweeps")
@@ -66,13 +65,14 @@ that runs which have not changed are not measured again.""",
         metavar="NAME,…",
         help="means and SE over runs with equal values in these columns; can be repeated",
     )
+    measure.add_argument("--unfinished", action="store_true", help="with --by: average over unfinished runs too")
     measure.add_argument("--phase", metavar="NAME|last", help="only phases of this type, or the last phase of each run")
     measure.add_argument(
         "--also",
         type=names,
         default=(),
         metavar="NAME,…",
-        help="measures on request, named in the description above; with --frames for every frame",
+        help="further measures, named in the description above; with --frames for every frame",
     )
     profile_help = "write φ(r, z) at the end of each phase, in rings and layers of the container, as CSV"
     measure.add_argument("--profile", type=Path, metavar="FILE.csv", help=profile_help)
@@ -86,6 +86,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
 
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.record.run import Run, open_run  # noqa: PLC0415
+    from postprocess.measures.pile import POUR  # noqa: PLC0415
     from postprocess.measures.profile import profile_table  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
@@ -109,9 +110,10 @@ def measure_runs(arguments: argparse.Namespace) -> int:
             table = of_phase(table, arguments.phase)
         except InputError as error:
             raise InputError(f"--phase {arguments.phase}: {error}") from None
+    runs = states(arguments.directories) if by else None
     if by:
         try:
-            table = grouped(table, by)
+            table = grouped(table, by, runs=runs, unfinished=arguments.unfinished)
         except InputError as error:
             raise InputError(f"--by {','.join(by)}: {error}") from None
     if output is not None:
@@ -124,8 +126,9 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         return 0
     shown = _shown(table, per_frame=arguments.frames)
     print(_text(table, by, shown))
-    print(_legend({column for _, column, _, _ in shown}, per_frame=arguments.frames, by=by))
-    for note in () if by else _notes(table):
+    poured = bool((table["phase type"] == POUR).any())
+    print(_legend({column for _, column, _, _ in shown}, per_frame=arguments.frames, by=by, poured=poured))
+    for note in _notes(table) if runs is None else _left_out(runs, unfinished=arguments.unfinished):
         print(f"note: {note}")
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
@@ -137,6 +140,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
 def _groups(arguments: argparse.Namespace) -> Sequence[str]:
     """Return the columns named by --by; empty without --by."""
     if arguments.by is None:
+        if arguments.unfinished:
+            raise InputError("--unfinished: is for means over runs, which --by makes; without it all runs are listed")
         return ()
     by: Sequence[str] = arguments.by
     if not by:
@@ -149,13 +154,14 @@ def _groups(arguments: argparse.Namespace) -> Sequence[str]:
 def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Column]:
     """Return the main columns of the table that have a value in at least one row."""
     from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
-    from postprocess.statistics.points import marked  # noqa: PLC0415
+    from postprocess.statistics.points import counted, marked  # noqa: PLC0415
 
     wanted = list(_ALWAYS)
     for quantity, shown in shown_quantities():
         wanted.append((shown.heading, quantity.header, shown.form, shown.factor))
         if shown.with_error:
             wanted.append(("± SE", marked(quantity.header, "SE"), shown.form, shown.factor))
+        wanted.append(("n", counted(quantity.header), ".0f", 1.0))
     wanted += _PER_FRAME if per_frame else ()
     return [entry for entry in wanted if entry[1] in table.columns and table[entry[1]].notna().any()]
 
@@ -164,7 +170,7 @@ def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> s
     """Return the printed table: one row per group with `by`, otherwise a block of rows per run."""
     from postprocess.statistics.points import RUNS  # noqa: PLC0415
 
-    named = [*by, RUNS] if by else []
+    named = group_columns(table, by) if by else []
     rows = [
         [
             *(row[name] for name in named),
@@ -175,26 +181,36 @@ def _text(table: pd.DataFrame, by: Sequence[str], shown: Sequence[_Column]) -> s
         ]
         for row in table.to_dict("records")
     ]
-    header = [*by, "runs"] if by else []
-    blocks = column_blocks(
-        [*header, *(heading for heading, *_ in shown)], rows, keys=len(named) + len(PHASE) if by else len(_ALWAYS)
-    )
-    return "\n\n".join("\n".join(block if by else _with_names(block, list(table["run"]))) for block in blocks)
+    header = ["runs" if name == RUNS else name for name in named]
+    keys = len(named) + sum(column in _ALWAYS for column in shown)
+    blocks = column_blocks([*header, *(heading for heading, *_ in shown)], rows, keys=keys)
+    return "\n\n".join("\n".join(block if by else _with_names(block, table)) for block in blocks)
 
 
-def _with_names(lines: Sequence[str], runs: Sequence[str]) -> list[str]:
-    """Insert the name of each run before its rows into the lines of a table, which begin with the header."""
-    named = [lines[0]]
-    for previous, run, line in zip([None, *runs], runs, lines[1:], strict=False):
-        named += [line] if run == previous else [f"{run}:", line]
+def _with_names(lines: Sequence[str], table: pd.DataFrame) -> list[str]:
+    """Insert the name of each run, and its state if it is unfinished, before its rows into the lines of `table`."""
+    named, previous = [lines[0]], None
+    for run, state, line in zip(table["run"], table[STATE], lines[1:], strict=True):
+        title = f"{run}:" if state == DONE else f"{run} ({state}):"
+        named += [line] if run == previous else [title, line]
+        previous = run
     return named
 
 
 def _notes(table: pd.DataFrame) -> list[str]:
-    """Return a line of text for each hook that touched nothing, or that was stopped at its force limit."""
+    """Return notes on rows of phases.
+
+    There is a line for each pour without a frame of the settled pile, and for each hook that touched nothing, or that
+    was stopped at its force limit.
+    """
     notes = []
-    for row in table.to_dict("records") if "hook work [J]" in table.columns else ():
+    for row in table.to_dict("records"):
         where = f"{row['run']}: phase {row['phase']} ({row['phase type']})"
+        if row.get("frames averaged") == 0:
+            remedy = "lower recording.frame_interval_s" if row[STATE] == DONE else "wait for the run, or resume it"
+            notes.append(f"{where}: no frame has the settled pile, so that there are no means of the pour; {remedy}")
+        if "hook work [J]" not in table.columns:
+            continue
         if row["hook work [J]"] == 0 and row["hook peak force over n W_s [-]"] == 0:
             notes.append(
                 f"{where}: nothing touched the hook while it was raised, so its force is 0 N; lower "
@@ -208,32 +224,44 @@ def _notes(table: pd.DataFrame) -> list[str]:
     return notes
 
 
-def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str:
+def _left_out(runs: pd.DataFrame, *, unfinished: bool) -> list[str]:
+    """Return a note on unfinished runs of a table of `states`; none if all runs are finished."""
+    done = int((runs[STATE] == DONE).sum())
+    if done == len(runs):
+        return []
+    others = ", ".join(f"{number} {state}" for state, number in runs[STATE].value_counts().items() if state != DONE)
+    means = "means include those that have frames" if unfinished else "means leave them out; --unfinished includes them"
+    return [f"{done} of {len(runs)} runs are finished, {others}; {means}"]
+
+
+def _legend(shown: Collection[str], *, per_frame: bool, by: Sequence[str], poured: bool) -> str:
     """Return the legend below the printed table: what a row is, and what the columns mean.
 
-    `shown` are the printed columns; a row is a frame, or a phase; `by` are columns whose values make groups of runs.
+    `shown` are the printed columns; a row is a frame, or a phase; `by` are columns whose values make groups of runs;
+    `poured`: whether there are rows of pours.
     """
-    from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS  # noqa: PLC0415
+    from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS, HEADINGS  # noqa: PLC0415
     from postprocess.measures.pull import WINDOW  # noqa: PLC0415
     from postprocess.measures.strain import FRACTURE, PEAK, QUANTITIES, WIDENING, YIELD  # noqa: PLC0415
     from postprocess.measures.table import LAST_FRAMES  # noqa: PLC0415
+    from postprocess.statistics.points import counted  # noqa: PLC0415
 
     averaged = f"means over the last {LAST_FRAMES} frames of each phase; SE: standard error of the mean"
     if by:
         averaged = f"means over runs and over the last {LAST_FRAMES} frames of each; SE: standard error over runs"
+    if poured and not per_frame:
+        averaged += "; of a pour, frames of the settled pile alone"
     lines = ["one row per frame" if per_frame else averaged]
-    if f"phi {_COMPARED} [-]" in shown:
-        costly = " and ".join(name for name in DEFINITIONS if name in COSTLY_DEFINITIONS)
+    definitions = {name: meaning for name, meaning in DEFINITIONS.items() if f"phi {name} [-]" in shown}
+    if costly := " and ".join(HEADINGS[name] for name in definitions if name in COSTLY_DEFINITIONS):
         lines[0] += f"; {costly} at the last frame of each phase only"
-        lines += [
-            f"{'φ by ' if name == _COMPARED else ''}{name}: {'' if name == _COMPARED else 'φ = '}{meaning}"
-            for name, meaning in DEFINITIONS.items()
-        ]
+    if any(counted(column) in shown for column in shown):
+        lines.append("n: number of values in the mean to its left, where it is not defined in all runs")
+    lines += [f"{HEADINGS[name]} ({name}): {meaning}" for name, meaning in definitions.items()]
     if "crossings mean [-]" in shown:
-        lines.append(
-            "⟨N⟩: mean number of links of others through a smarticle's plane; z: height of the centre of mass "
-            "above the floor"
-        )
+        lines.append("⟨N⟩: mean number of links of others through a smarticle's plane")
+    if "com height [m]" in shown:
+        lines.append("z: height of the centre of mass above the floor")
     if "average crossing number mean [-]" in shown:
         lines.append(
             "⟨ACN⟩: average crossing number of a smarticle with all others, half the crossings that are seen from a "
@@ -242,8 +270,16 @@ def _legend(shown: Container[str], *, per_frame: bool, by: Sequence[str]) -> str
     if "hook work [J]" in shown:
         lines.append(
             f"peak F/nW: largest running mean ({WINDOW:g} s) of the force on the raised hook, divided by the weight of "
-            "all smarticles; hook work: ∫ F dz over the whole pull"
+            "all smarticles; lower F/nW: upward force of the pile on the lower hook at that time; hook work: "
+            "∫ F dz over the whole pull"
         )
+    if "peak pull over n W_s [-]" in shown:
+        lines.append(
+            f"peak F/nW: largest running mean ({WINDOW:g} s) of the force that holds back the moving grip, divided by "
+            "the weight of all bodies; resting F/nW: the pull on the other grip at that time"
+        )
+    if "picked up [smarticles]" in shown:
+        lines.append("picked up: what the grip bears, gripped bodies included")
     if PEAK in shown:
         lines.append(
             f"peak F: {QUANTITIES[PEAK]}; strain: of the distance along x between the points where the strings are tied"

@@ -29,7 +29,7 @@ and the expected wall time.
 --max-error and --max-hours choose engine and fidelity. With --max-error, the cheapest choice is taken
 whose measured error of the packing fractions φ_0 and φ_f (or of the quantities of --of) is below the
 limit; with --max-hours alone, the most accurate choice within the wall time. --engine restricts the
-choice to one engine. Errors are read from a table of `smarticles accuracy SCENE --knobs engine`.""",
+choice to one engine. Errors are read from a table of `smarticles accuracy SCENE --parameters engine`.""",
         examples="""\
   smarticles plan scene.yaml
   smarticles plan scene.yaml --set fidelity=reference

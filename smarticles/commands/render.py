@@ -44,8 +44,8 @@ def add(commands: Commands) -> None:
         render_run,
         summary="draw a picture, a film or a chart of a run",
         text="""
-Draws the boxes of all smarticles, the cylinder cut open in front, hooks, plate, strings and a scale
-bar. No display is needed. The suffix of the output chooses between a picture (.png) and a film (.gif,
+Draws all bodies by their true sections, the cylinder cut open in front, hooks, plate, strings and a
+scale bar. No display is needed. The suffix of the output chooses between a picture (.png) and a film (.gif,
 .webp, .mp4). A film plays at a constant speed, which is written on it. Names of kinds are in a legend.
 With --series, draws recorded series against time instead, with phases as bands.""",
         examples="""\

@@ -22,13 +22,16 @@ results, warnings from the logs, and the commands that repeat the work. The file
 and needs no network.""",
         examples="""\
   smarticles report runs/a                                  runs/a/report.html
-  smarticles report friction --output friction.html         a sweep
+  smarticles report friction --output friction.html         a sweep, with means of its last phase of rest first
+  smarticles report friction --phase shake --overwrite      a sweep, with means of its shaken phase first
   smarticles report gravish                                 a study, with its findings
   smarticles report results/gravish --output gravish.html   the results of a study, without its runs
 """,
     )
     add_options(report, "directory", help="directory of a run, a sweep, a study, or the results of a study")
     add_options(report, "--output", metavar="FILE.html", help="default: DIR/report.html")
+    phase_help = "type of the phase of a sweep whose means come first and are drawn; default: the last phase of rest"
+    report.add_argument("--phase", metavar="NAME|last", help=phase_help)
     report.add_argument(
         "--accuracy", type=Path, metavar="FILE.csv", help="table of measured errors; default: the table that ships"
     )
@@ -56,21 +59,23 @@ def write_report(arguments: argparse.Namespace) -> int:
         except InputError as error:
             raise InputError(str(error).replace("--table", "--accuracy")) from None
     with progress_of(f"report of {directory}") as progress:
-        text = _page(directory, arguments.accuracy, arguments.jobs, progress)
+        text = _page(directory, arguments.accuracy, arguments.jobs, arguments.phase, progress)
     with whole_file(output, overwrite=arguments.overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
     print(f"{output}: {len(text.encode()) / 1e6:.1f} MB; open it in a browser")
     return 0
 
 
-def _page(directory: Path, accuracy: Path | None, jobs: int | None, progress: Steps) -> str:
+def _page(directory: Path, accuracy: Path | None, jobs: int | None, phase: str | None, progress: Steps) -> str:
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from smarticles.reporting.run import run_page  # noqa: PLC0415  (pandas, matplotlib, PyVista)
     from smarticles.reporting.sweep import PROVENANCE, results_page, sweep_page  # noqa: PLC0415
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 
     if (directory / OF_SWEEP).is_file():
-        return sweep_page(open_folder(directory), accuracy, jobs=jobs or usable_cores(), progress=progress)
+        return sweep_page(open_folder(directory), accuracy, jobs=jobs or usable_cores(), phase=phase, progress=progress)
+    if phase is not None:
+        raise InputError(f"--phase {phase}: {directory} is no sweep; leave it out, the page of a run has all phases")
     if (directory / MANIFEST).is_file():
         return run_page(directory, accuracy)
     if (directory / PROVENANCE).is_file():

@@ -183,7 +183,7 @@ def _fidelity(name: str, file: Path, fidelity: str) -> dict[str, str]:
     sweep, changed = load_sweep(file), {"fidelity": fidelity}
     shipped = sweep.content.constants.get("fidelity")
     if fidelity == (shipped["base"] if isinstance(shipped, Mapping) else shipped):
-        return {}  # the study's own fidelity of this name, with its changes to single knobs
+        return {}  # the study's own fidelity of this name, with its changes to single parameters
     try:
         scenes = [{point.scene_sha256 for point in expand(s)} for s in (sweep, with_constants(sweep, changed))]
     except InputError as error:

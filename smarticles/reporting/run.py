@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from markupsafe import Markup
 
@@ -17,13 +18,17 @@ from dem.plan.choice import QUANTITIES, Error, activity_of, read_table
 from dem.plan.effects import decide
 from dem.plan.outlook import plan
 from dem.record.columns import EVERY
+from dem.record.document import Kind, Manifest
 from dem.record.names import LOG, SCENE
 from dem.record.run import Run, open_run
 from dem.scene.reading import load_scene
 from dem.scene.scene import Scene
+from postprocess.measures.packing import COSTLY_DEFINITIONS, DEFINITIONS, HEADINGS
+from postprocess.measures.pile import POUR
 from postprocess.measures.registry import Shown, shown_quantities
+from postprocess.measures.table import LAST_FRAMES
 from postprocess.report.series import spans_of
-from postprocess.statistics.points import format_with_error, marked
+from postprocess.statistics.points import RUNS, counted, format_with_error, marked
 from smarticles.command_line import format_cell
 from smarticles.measuring import has_frames, measured
 from smarticles.reporting.charts import against_time
@@ -101,15 +106,21 @@ def _measures(directory: Path) -> list[Markup]:
     if not has_frames(directory):
         return [words("No frame has been recorded, so that there are no measures.", tone="note")]
     found = measured([directory])
-    caption = "Means over the last 20 frames of each phase ± standard error; voxel and voronoi: last frame only"
+    caption = f"Means over the last {LAST_FRAMES} frames of each phase ± standard error"
+    if (found["phase type"] == POUR).any():
+        caption += "; of a pour, frames of the settled pile alone"
+    present = found.columns[found.notna().any()]
+    costly = [name for name in DEFINITIONS if name in COSTLY_DEFINITIONS and f"phi {name} [-]" in present]
+    if costly:
+        caption += f"; {' and '.join(HEADINGS[name] for name in costly)}: last frame only"
     whole = found.drop(columns=["run", "scene_sha256"])
     return [short_table(found, ["phase type"], caption), frame_table(whole, "All measures of each phase")]
 
 
-def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Markup:
+def short_table(found: pd.DataFrame, named: Sequence[str], caption: str, *, folded: bool = False) -> Markup:
     """Return a table of the main quantities of `measured` or `grouped` as `mean ± SE`.
 
-    The columns `named` identify a row.
+    The columns `named` identify a row. A mean over fewer runs than the row's has their number, `(n = 2)`.
     """
     present = found.columns[found.notna().any()]
     wanted = [(quantity.header, shown) for quantity, shown in shown_quantities() if quantity.header in present]
@@ -119,12 +130,13 @@ def short_table(found: pd.DataFrame, named: Sequence[str], caption: str) -> Mark
             *(row[name] for name in named),
             *(
                 format_with_error(s.factor * row[name], s.form, s.factor * row.get(marked(name, "SE"), float("nan")))
+                + (f" (n = {number})" if 0 < (number := row.get(counted(name), 0)) < row[RUNS] else "")
                 for name, s in wanted
             ),
         ]
         for row in found.to_dict("records")
     ]
-    return table(caption, [*named, *(shown.heading for _, shown in wanted)], rows)
+    return table(caption, [*named, *(shown.heading for _, shown in wanted)], rows, folded=folded)
 
 
 def frame_table(found: pd.DataFrame, caption: str) -> Markup:
@@ -160,7 +172,7 @@ def picture_blocks(
             return [words(f"No picture: {error}", tone="note")]
     moment = run.phases[-1].type if run.status.state == "done" else "its last frame"
     manifest = run.manifest
-    shows = f"The {manifest.count} smarticles of {manifest.name} at the end of {moment}, drawn as boxes"
+    shows = f"The {_bodies(manifest)} of {manifest.name} at the end of {moment}, drawn as {drawn_as(manifest.kinds)}"
     caption = f"Run {name}" if name else f"{shows}. For other views or times use smarticles render."
     blocks = [figure(caption, shows, still, "card")]
     if views:
@@ -168,6 +180,17 @@ def picture_blocks(
         how = "Move the pointer across the picture, tap, or use the arrow keys to turn it."
         blocks.append(turntable(f"{f'Run {name} from all sides' if name else around}. {how}", around, views))
     return blocks
+
+
+def _bodies(manifest: Manifest) -> str:
+    return f"{manifest.count} {'smarticles' if manifest.kinds is None else 'bodies'}"
+
+
+def drawn_as(kinds: Sequence[Kind] | None) -> str:
+    """Return what pictures draw bodies of some kinds as: boxes, cylinders, or both; None: smarticles."""
+    if kinds is None:
+        return "boxes"
+    return " and ".join(sorted({"cylinders" if kind.round else "boxes" for kind in kinds}))
 
 
 def _curves(run: Run) -> list[Markup]:
@@ -180,14 +203,25 @@ def _curves(run: Run) -> list[Markup]:
         if name not in series.data:
             continue
         values = factor * (series[name] if component is None else series[name][:, component]).astype(float)
+        caption = f"{series.descriptions.get(name, EVERY[name].label)}. Bands are phases."
+        lifted = _lifted(run) if name == "packing_fraction" else []
+        if lifted:
+            values[np.isin(series["phase"], lifted)] = np.nan
+            caption += " It is left out where grips or a raised hook hold bodies, or have dropped them."
         if not (abs(values) > 0).any():
             continue
+        known = values[np.isfinite(values)]
         label = EVERY[name].label + ("" if component is None else f" {'xyz'[component]}")
-        alt = f"{label} against time, from {values[0]:.3g} to {values[-1]:.3g} {unit}".removesuffix(" -")
-        caption = f"{series.descriptions.get(name, label)}. Bands are phases."
+        alt = f"{label} against time, from {known[0]:.3g} to {known[-1]:.3g} {unit}".removesuffix(" -")
         picture = against_time(series.time, values, f"{label} [{unit}]", spans)
         blocks.append(figure(caption[0].upper() + caption[1:], alt, picture, "chart"))
     return blocks
+
+
+def _lifted(run: Run) -> list[int]:
+    """Return the numbers of the phases in which bodies hang or fall, so that they are not one pile."""
+    made = run.manifest
+    return [phase.index for phase in made.phases if made.held(phase.index) or made.dropped(phase.index)]
 
 
 def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:
@@ -228,9 +262,15 @@ def effect_blocks(scenes: Sequence[Scene]) -> list[Markup]:
         reasons = list(dict.fromkeys(one.why for one in on or decisions))
         more = [f"and {len(reasons) - _MAX_REASONS} more reasons"] if len(reasons) > _MAX_REASONS else []
         state = f"{len(on)} of {len(decisions)}" if len(decisions) > 1 else "on" if on else "off"
-        rows.append([effect.name, state, "; ".join([*reasons[:_MAX_REASONS], *more]), effect.adds.to_text()])
+        rows.append(
+            [effect.name, state, "; ".join([*reasons[:_MAX_REASONS], *more]), effect.adds.to_text(internals=False)]
+        )
     caption = "Effects and the reasons for each; an effect that is off is not computed"
-    return [table(caption, ["effect", "on in scenes", "reason", "added computation"], rows)] if rows else []
+    return (
+        [table(caption, ["effect", "on in scenes", "reason", "what it records, and work besides the steps"], rows)]
+        if rows
+        else []
+    )
 
 
 def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
@@ -241,10 +281,10 @@ def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
     if scene is None:
         return []
     base, named = scene.fidelity.base, scene.named_knobs
-    knobs = scene.fidelity.model_dump(exclude={"base"})
-    caption = f"Knobs of fidelity {base} on {scene.engine}"
-    rows = [[knob, value, named.get(knob)] for knob, value in knobs.items()]
-    blocks = [table(caption, ["knob", "this scene", base], rows)]
+    parameters = scene.fidelity.model_dump(exclude={"base"})
+    caption = f"Numerical parameters of fidelity {base} on {scene.engine}"
+    rows = [[name, value, named.get(name)] for name, value in parameters.items()]
+    blocks = [table(caption, ["parameter", "this scene", base], rows)]
     try:
         known = read_table(path, of=tuple(QUANTITIES), activity=activity_of(scene))
     except InputError as error:
@@ -265,7 +305,7 @@ def accuracy_blocks(scene: Scene | None, path: Path | None) -> list[Markup]:
         for entry in known.fidelities
     ]
     notes = [] if here else [f"Fidelity {base} on {scene.engine} is not among those measured."]
-    changed = [knob for knob, value in knobs.items() if knob in named and value != named[knob]]
+    changed = [name for name, value in parameters.items() if name in named and value != named[name]]
     if changed:
         notes.append(f"This scene changes {', '.join(changed)}, which the table does not cover.")
     notes.append("The errors were measured on one pile; other piles, activities and quantities may have larger errors.")

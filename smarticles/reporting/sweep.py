@@ -13,7 +13,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from dem.display import Steps, silent
-from dem.errors import InputError
+from dem.errors import InputError, nearest
 from dem.record.run import Run
 from dem.scene.reading import load_scene
 from dem.scene.scene import Scene
@@ -21,7 +21,7 @@ from postprocess.measures.entanglement import link_crossings
 from postprocess.measures.registry import in_space, shown_quantities
 from postprocess.statistics.points import RUNS, marked
 from smarticles.command_line import format_cell
-from smarticles.measuring import follows, grouped, has_frames, measured, values_in
+from smarticles.measuring import PHASE, follows, group_columns, grouped, has_frames, measured, states, values_in
 from smarticles.reporting.charts import against_variable
 from smarticles.reporting.page import Section, embedded, figure, listing, page, table, words
 from smarticles.reporting.run import (
@@ -34,9 +34,9 @@ from smarticles.reporting.run import (
     short_table,
     warning_blocks,
 )
-from studies.registry import STUDIES
+from studies.registry import Script, study_of
 from templates.sweep.folder import Folder
-from templates.sweep.sweep_file import SEED
+from templates.sweep.sweep_file import SEED, load_sweep
 
 PROVENANCE = "provenance.json"  #: File in every folder of results
 
@@ -47,14 +47,17 @@ _MAX_STILLS, _MAX_CURVES, _MAX_CHARTS, _MAX_PARTS = 4, 5, 4, 4
 _LEAST_RUNS = 3  # for an interval that is worth its name
 
 
-def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int, progress: Steps = silent) -> str:
+def sweep_page(
+    folder: Folder, accuracy: Path | None, *, jobs: int, phase: str | None = None, progress: Steps = silent
+) -> str:
     """Return the HTML page of a sweep or a study; `jobs` processes measure its runs.
 
-    `accuracy` is the path of a table of measured errors; None: the table that ships. `progress` is called after each
-    run that is measured or drawn.
+    `accuracy` is the path of a table of measured errors; None: the table that ships. `phase` is the type of the phase
+    whose means come first, or "last"; None: the last phase of rest. `progress` is called after each run that is
+    measured or drawn.
     """
-    states = folder.status()
-    study = folder.name.removesuffix("-quick")
+    runs = folder.status()
+    known = study_of(folder.manifest.files)
     results = folder.path / "results"
     analysed = (results / PROVENANCE).is_file()
     varied = values_in(folder)
@@ -62,17 +65,20 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int, progress: St
     first = next(iter(scenes), None)
     scene = scenes[first] if first else None
     scene_error = "This version cannot read the scenes of this sweep."
-    rows = [[run.name, run.state, run.phase, run.time_s, run.cause] for run in states if run.state != "done"]
+    rows = [[run.name, run.state, run.phase, run.time_s, run.cause] for run in runs if run.state != "done"]
     header = ["run", "state", "phase", "simulated [s]", "cause"]
     state = [table(f"Runs that are not done: {len(rows)}", header, rows)] if rows else []
     variables = [[name, ", ".join(map(format_cell, values)), str(len(values))] for name, values in varied.items()]
-    if study in STUDIES and not analysed:
-        quick = " --quick" if folder.name.endswith("-quick") else ""
-        command = f"smarticles study {study}{quick} --out {shlex.quote(folder.path.resolve().name)} --analyse"
+    if known is not None and not analysed:
+        command = f"smarticles study {_options(folder, *known)} --analyse"
         state.append(words(f"The study has not been analysed yet; analyse it with: {command}", tone="note"))
     sections = (
         ("State", state),
-        *(_result_sections(results) if analysed else _measured(folder, varied, jobs=jobs, progress=progress)),
+        *(
+            _result_sections(results)
+            if analysed
+            else _measured(folder, varied, jobs=jobs, phase=phase, progress=progress)
+        ),
         ("Final states", _pictures(folder, progress)),
         ("Variables", [table("Variables and constants", ["name", "values", "number of values"], variables)]),
         (
@@ -89,11 +95,23 @@ def sweep_page(folder: Folder, accuracy: Path | None, *, jobs: int, progress: St
         ("How to repeat it", _repeat(folder) + (_origin(results) if analysed else [])),
     )
     lead = [
-        ("runs", str(len(states))),
-        *((state, str(number)) for state, number in Counter(run.state for run in states).items()),
+        ("runs", str(len(runs))),
+        *((state, str(number)) for state, number in Counter(run.state for run in runs).items()),
         ("variables", ", ".join(name for name, values in varied.items() if len(values) > 1) or "none"),
     ]
-    return page(folder.name, "study" if study in STUDIES else "sweep", lead, sections, folder.path)
+    return page(folder.name, "sweep" if known is None else "study", lead, sections, folder.path)
+
+
+def _options(folder: Folder, study: Script, quick: bool) -> str:
+    """Return the arguments of `smarticles study` that make this folder: name, variant, changed constants, directory."""
+    shipped, made = load_sweep(study.sweep_file(quick=quick)).content.constants, folder.entries[0].values
+    changed = [
+        f"--{name} {shlex.quote(str(made[name]))}"
+        for name in ("engine", "fidelity")
+        if isinstance(made.get(name), str) and made[name] != shipped.get(name)
+    ]
+    words = [study.name, *(["--quick"] if quick else []), *changed]
+    return " ".join([*words, "--out", shlex.quote(folder.path.resolve().name)])
 
 
 def results_page(folder: Path) -> str:
@@ -120,13 +138,17 @@ def _scenes(folder: Folder) -> dict[str, Scene]:
 # -- measures ----------------------------------------------------------------------------------------------------------
 
 
-def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int, progress: Steps) -> list[Section]:
+def _measured(
+    folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int, phase: str | None, progress: Steps
+) -> list[Section]:
     """Measure a sweep with `jobs` processes; return sections of tables and charts of means over runs.
 
-    Means are over runs with equal variables. `varied` has all values of each variable and constant.
+    Means are over finished runs with equal variables. `varied` has all values of each variable and constant. `phase` is
+    that of `sweep_page`: its means come first and are drawn, those of other phases are folded.
     """
     if not any(has_frames(folder.run(entry)) for entry in folder.entries):
         return [("Result", [words("No run has frames yet.", tone="note")])]
+    leading = _leading_phases(folder, phase)
     runs = measured([folder.path], costly="never", jobs=jobs, progress=progress)
     # Variables that are a function of another one, as the count may be of l/w, do not define groups.
     by: list[str] = []
@@ -135,18 +157,39 @@ def _measured(folder: Folder, varied: Mapping[str, Sequence[Any]], *, jobs: int,
         if name != SEED and len(values) > 1 and not any(follows(name, other, rows) for other in by):
             by.append(name)
     by = [name for name in by if name in runs.columns]
-    means = grouped(runs, by)
-    last = means["phase"].max()
-    final = means[means["phase"] == last]
-    kind = str(final["phase type"].iloc[0])
-    caption = f"Means over runs ± standard error, phase {final['phase'].iloc[0]} ({kind}).{_few(final)}"
-    tables = [
-        short_table(final, [*by, "runs [-]"], caption),
-        frame_table(means, "All phases and measures, means over runs"),
+    means = grouped(runs, by, runs=states([folder.path]), intervals=True)
+    first = max(leading & set(means["phase"]) or means["phase"])
+    tables = []
+    phases = means[list(PHASE)].drop_duplicates().itertuples(index=False, name=None)
+    # The sort is stable, so that the other phases keep their order.
+    for number, kind in sorted(phases, key=lambda one: one[0] != first):
+        part = means[(means["phase"] == number) & (means["phase type"] == kind)]
+        caption = f"Means over finished runs ± standard error, phase {number} ({kind}).{_few(part)}"
+        tables.append(short_table(part, group_columns(means, by), caption, folded=number != first))
+    final = means[means["phase"] == first]
+    tables += [
+        frame_table(
+            means[[name for name in means.columns if " 95 % [" not in name]],
+            "All phases and measures, means over finished runs",
+        ),
         frame_table(runs.drop(columns=["scene_sha256"]), "All runs"),
     ]
-    with_intervals = grouped(runs[runs["phase"] == last], by, intervals=True)
-    return [("Result", tables), ("Figures", _figures(with_intervals, by, varied, kind))]
+    return [("Result", tables), ("Figures", _figures(final, by, varied, str(final["phase type"].iloc[0])))]
+
+
+def _leading_phases(folder: Folder, wanted: str | None) -> set[int]:
+    """Return the numbers of the phases of which the last one comes first, see `sweep_page`.
+
+    InputError if no run has a phase of the type `wanted`.
+    """
+    plans = [Run(path).manifest.phases for entry in folder.entries if has_frames(path := folder.run(entry))]
+    phases = [phase for plan in plans for phase in plan]
+    if wanted is None:
+        return {phase.index for phase in phases if phase.at_rest}
+    types = dict.fromkeys(phase.type for phase in phases)
+    if wanted not in (*types, "last"):
+        raise InputError(f"--phase {wanted}: no run has a phase {wanted!r}; {nearest(wanted, [*types, 'last'])}")
+    return {phase.index for phase in phases if wanted in (phase.type, "last")}
 
 
 def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequence[Any]], kind: str) -> list[Markup]:
@@ -176,7 +219,7 @@ def _figures(final: pd.DataFrame, by: Sequence[str], varied: Mapping[str, Sequen
             means, half_widths = (shown.factor * rows[column] for column in columns)
             name = "all" if curve_name is None else f"{curve_name} = {value}"
             groups[name] = (rows[x_name].tolist(), means.tolist(), half_widths.tolist())
-        heading = shown.heading if "[" in shown.heading else f"{shown.heading} [-]"
+        heading = shown.heading if "[" in shown.heading else f"{shown.heading} [{quantity.unit}]"
         drawn = part[quantity.header] * shown.factor
         alt = f"{quantity.label} against {x_name}{fixed}, from {drawn.min():.3g} to {drawn.max():.3g}"
         caption = f"{heading}: {quantity.label} against {x_name}{fixed}, phase {kind}. Means over runs; bars: 95 % "

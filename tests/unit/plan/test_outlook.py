@@ -8,7 +8,7 @@ import pytest
 from scenes import small
 
 from dem.engine.demand import Activity
-from dem.engine.effect import Adds
+from dem.engine.effect import Adds, EffectName
 from dem.engine.kinds import engine_kind
 from dem.plan.effects import ADDS, decide
 from dem.plan.outlook import Plan, plan, warnings_of
@@ -78,6 +78,13 @@ def test_the_total_counts_the_start_of_a_run() -> None:
     lines = [line.split() for line in planned.to_text().splitlines()]
     assert ["starting", "2.5", "s"] in lines
     assert next(line for line in lines if line[:1] == ["total"])[-2:] == ["2.5", "s"]
+
+
+def test_a_reason_about_barbs_is_about_bodies_that_have_some() -> None:
+    rods = small({"engine": "links", "particle": {"shape": "rod", "length_m": 0.01, "diameter_m": 0.001}})
+    reasons = [next(d.why for d in decide(scene) if d.name == EffectName.ARTICULATION) for scene in (small({}), rods)]
+    assert "each smarticle is one rigid body" in reasons[0]
+    assert "smarticle is" not in reasons[1]
 
 
 def test_knobs_are_compared_with_those_of_the_name_in_this_scene() -> None:

@@ -59,7 +59,7 @@ def test_a_dry_run_shows_ladder_and_hours_and_writes_nothing(base: Path, smartic
     said = smarticles("accuracy", base, "--dry-run", "--jobs", "2")
     assert said.status == 0
     lines = said.out.splitlines()
-    assert lines[0].split()[:3] == ["knob", "value", "setting"]
+    assert lines[0].split()[:3] == ["parameter", "value", "setting"]
     assert lines[1].split()[:3] == ["time-step", "0.9", "base"]
     assert lines[3].split()[:4] == ["time-step", "0.225", "time-step-0.225", "reference"]
     assert sum("reference" in line.split()[2:] for line in lines) >= 5
@@ -137,7 +137,7 @@ def test_more_seeds_and_knobs_are_added_in_the_directory(
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ("accuracy --knobs timestep", "--knobs: 'timestep' is no knob; did you mean 'time-step'?"),
+        ("accuracy --knobs timestep", "--parameters: 'timestep' does not exist; did you mean 'time-step'?"),
         ("accuracy --seeds ,", "--seeds ',': must be whole numbers from 0, such as 1,2,3"),
         ("accuracy", "accuracy: --out DIR is missing; give a directory, or --dry-run to only show the ladder"),
         ("plan --max-error 0.03 --table {base}", "has no column 'knob', so it is no table of work and precision"),

@@ -127,6 +127,20 @@ def test_groups_have_means_and_standard_errors_over_runs(swept: smarticles.Sweep
     assert shaken[phi].tolist() == pytest.approx([0.13 * 1.002, 0.25 * 1.002], rel=1e-9)
     assert shaken[error].tolist() == pytest.approx([0.01 * 1.002, 0.05 * 1.002], rel=1e-9)
     assert shaken["runs [-]"].tolist() == [2, 2]
+    assert shaken["state"].tolist() == ["2 of 2 finished"] * 2
+
+
+def test_groups_leave_out_unfinished_runs(swept: smarticles.SweepDirectory) -> None:
+    (swept[1].path / "done.json").unlink()
+    phi = "phi second-highest-com [-]"
+    for unfinished, mean, runs in ((False, 0.12, 1), (True, 0.13, 2)):
+        means = swept.table(by="aspect_ratio", unfinished=unfinished)
+        first = means[means["phase type"] == "shake"].iloc[0]
+        assert (first[phi], first["runs [-]"]) == (pytest.approx(mean * 1.002), runs)
+        assert first["state"] == "1 of 2 finished"
+    assert swept.table()["state"].tolist() == ["done"] * 4 + ["stopped"] * 4 + ["done"] * 8
+    with pytest.raises(smarticles.InputError, match="unfinished: is for means over runs; give by"):
+        swept.table(unfinished=True)
 
 
 def test_what_follows_from_a_scene_follows_anew_where_it_varies(tmp_path: Path) -> None:

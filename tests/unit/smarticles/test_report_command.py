@@ -14,6 +14,7 @@ import yaml
 from command_cases import Smarticles, WriteRun
 from scenes import small
 
+from dem.record.document import Kind
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from postprocess.pictures import render
@@ -21,10 +22,11 @@ from postprocess.report import figures
 from postprocess.report.series import thinned
 from postprocess.statistics.points import means_by
 from smarticles.reporting.charts import Groups, against_variable
-from smarticles.reporting.run import accuracy_blocks, effect_blocks
+from smarticles.reporting.run import accuracy_blocks, drawn_as, effect_blocks
 from smarticles.reporting.sweep import _figures
-from smarticles.sweeps import make_folder
+from smarticles.sweeps import changed_sweep, folder_of, make_folder
 from studies.registry import shipped
+from templates.sweep.expand import expand
 
 
 class Read(HTMLParser):
@@ -94,6 +96,9 @@ def test_the_page_of_a_run_has_everything(run: Path, smarticles: Smarticles) -> 
     assert page.row("shake")[2].startswith("0.1300 ± 0.000")
     assert page.row("motors", "off")[2] == "no phase actuates"
     assert page.row("container motion", "on")[2].startswith("phase 2: Γ = 2")
+    # What the effect records, not the parts of the engine that compute it.
+    assert page.row("series", "on")[3].startswith("files series.h5; ")
+    assert not any("push_apart" in cell for row in page.rows for cell in row)
     assert page.row("rows") == ["rows", "2", "1"]
     assert page.row("links", "draft")[-1] == "this run"
     assert "This scene changes rows, which the table does not cover." in page.text
@@ -181,14 +186,24 @@ def test_the_page_of_a_sweep_has_means_and_figures(
         write_run(folder.run(entry), packing=(0.1, 0.1, phi, phi), **{k: entry.values[k] for k in ("count", "seed")})
     assert smarticles("report", folder.path).status == 0
     page = Read(folder.path / "report.html")
-    assert page.row("5", "2")[3].startswith("0.1300 ± 0.0100")
-    assert page.row("6", "1")[3] == "0.2000"
+    assert page.row("5", "2", "2 of 2 finished")[4].startswith("0.1300 ± 0.0100")
+    assert page.row("6", "1", "1 of 2 finished")[4] == "0.2000"
     assert page.row("n6_2")[:2] == ["n6_2", "missing"]
     assert page.row("contact")[1] == "4 of 4"
     assert page.row("count", "5, 6")[2] == "2"
     assert "smarticles sweep <hostile>" in page.text
     alts = [attributes["alt"] for attributes in page.of("img")]
     assert "phi second-highest-com against count, from 0.13 to 0.2" in alts
+    assert "Means over finished runs ± standard error, phase 3 (relax)." in page.text
+    # The phase that is asked for comes first; the others are folded.
+    assert smarticles("report", folder.path, "--phase", "deposit", "--overwrite").status == 0
+    page = Read(folder.path / "report.html")
+    assert page.row("5", "2", "2 of 2 finished")[4].startswith("0.1000 ± 0.000")
+    folded = page.text.count("Means over finished runs ± standard error, phase ")
+    assert folded == 1 + 2 * 3  # caption of the table, and of a folded one its summary, too
+    unknown = smarticles("report", folder.path, "--phase", "shakes", "--overwrite")
+    assert unknown.status == 2
+    assert "--phase shakes: no run has a phase 'shakes'; did you mean 'shake'?" in unknown.err
 
 
 def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
@@ -239,6 +254,45 @@ def test_a_study_is_analysed_drawn_and_reported(tmp_path: Path, write_run: Write
     assert Read(tmp_path / "results.html").row("φ_f is above φ_0 at every l/w")
 
 
+def test_a_sweep_with_the_name_of_a_study_is_a_sweep(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    sweep_file.write_text(sweep_file.read_text().replace("name: counts", "name: friction"))
+    folder = make_folder(sweep_file, tmp_path / "friction", "test")
+    write_run(folder.run(folder.entries[0]), phases=("deposit", "relax", "shake"), frames_per_phase=1)
+    smarticles("report", folder.path)
+    page = Read(folder.path / "report.html")
+    assert "smarticles study" not in page.text
+    assert "friction – sweep" in page.text
+    # A drive is last, but the last rest comes first.
+    assert page.text.index("phase 1 (relax)") < page.text.index("phase 2 (shake)")
+
+
+@pytest.mark.parametrize(
+    ("name", "engine", "words"),
+    [
+        ("strength-code", None, "strength-code --quick"),
+        ("compaction", None, "compaction"),
+        ("compaction", "yade", "compaction --engine yade"),
+    ],
+)
+def test_a_study_is_known_by_its_files(
+    name: str, engine: str | None, words: str, tmp_path: Path, smarticles: Smarticles
+) -> None:
+    sweep = changed_sweep(shipped(name).sweep_file(quick="--quick" in words), engine=engine)
+    points = expand(sweep)[:2]
+    folder = folder_of(sweep, points, tmp_path / "mine", "test", expected_s=[1.0] * 2)
+    smarticles("report", folder.path)
+    page = Read(folder.path / "report.html")
+    assert f"smarticles study {words} --out mine --analyse" in page.text
+    manifest = folder.path / "sweep.json"
+    content = json.loads(manifest.read_text(encoding="utf-8"))
+    content["files"] = {file: f"{text}# changed" for file, text in content["files"].items()}
+    manifest.write_text(json.dumps(content), encoding="utf-8")
+    smarticles("report", folder.path, "--overwrite")
+    assert "smarticles study" not in Read(folder.path / "report.html").text
+
+
 # -- parts -------------------------------------------------------------------------------------------------------------
 
 
@@ -271,6 +325,33 @@ def test_charts_of_several_variables_have_intervals_and_a_part_for_each_combinat
     assert (list(xs), means) == ([5, 10, 15], pytest.approx([11.7, 16.7, 21.7]))
     assert half_widths == pytest.approx([4.303 * 0.1] * 3, rel=1e-3)  # Student's t, three values
     assert drawn[1]["omega = 0"][2] == pytest.approx([12.706 * 0.1] * 3, rel=1e-3)  # two runs
+
+
+def test_the_chart_of_a_packing_fraction_leaves_out_a_lifted_pile(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a", phases=("deposit", "relax", "pull-hook"), frames_per_phase=1)
+    smarticles("report", run)
+    page = Read(run / "report.html")
+    # φ is 0.105 at the end of the rest, and 0.130 of the made-up pull.
+    (alt,) = [alt for a in page.of("img") if (alt := a["alt"] or "").startswith("packing fraction against time")]
+    assert alt.endswith("to 0.105")
+    assert "It is left out where grips or a raised hook hold bodies" in page.text
+
+
+@pytest.mark.parametrize(
+    ("rounds", "drawn"),
+    [((), "boxes"), ((False,), "boxes"), ((True, True), "cylinders"), ((True, False), "boxes and cylinders")],
+)
+def test_captions_name_the_sections_of_bodies(rounds: tuple[bool, ...], drawn: str) -> None:
+    kinds = [
+        Kind(
+            shape="rod", bodies=1, bars=1, mass_kg=1.0, volume_m3=1.0, length_m=1.0, thickness_normal_m=1.0,
+            thickness_in_plane_m=1.0, round=one, sphere_diameter_m=1.0,
+        )
+        for one in rounds
+    ]  # fmt: skip
+    assert drawn_as(kinds or None) == drawn
 
 
 def test_reasons_of_effects_are_those_of_all_scenes() -> None:

@@ -68,7 +68,7 @@ def test_measure_adds_measures_on_request_alone(tmp_path: Path, write_run: Write
     assert "⟨ACN⟩: average crossing number" in said.out
     unknown = smarticles("measure", run, "--also", "caging,crossing")
     assert unknown.status == 2
-    assert "also: 'crossing' is no measure on request; did you mean 'crossing-number'?" in unknown.err
+    assert "also: there is no measure 'crossing' to add; did you mean 'crossing-number'?" in unknown.err
 
 
 def test_measure_takes_a_sweep_whose_fidelity_is_a_mapping(
@@ -111,6 +111,53 @@ def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
     unknown = smarticles("measure", out, "--phase", "shakes")
     assert unknown.status == 2
     assert "--phase shakes: no run has a phase 'shakes'; did you mean 'shake'?" in unknown.err
+
+
+def test_means_are_those_of_finished_runs_unless_asked(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    out, table = tmp_path / "out", tmp_path / "means.csv"
+    text = sweep_file.read_text().replace("[5, 6]", "[5, 6, 7]").replace("n{{ count }}", "n{{ count }}_{{ seed }}")
+    sweep_file.write_text(text + "repeats: {seeds: [1, 2]}\n")
+    template = tmp_path / "scene.yaml.j2"
+    template.write_text(template.read_text().replace("seed: 1", "seed: {{ seed }}"))
+    smarticles("sweep", sweep_file, "--out", out)
+    runs = {"n5_1": ("done", 0.12), "n5_2": ("failed", 0.14), "n6_1": ("unfinished", 0.16)}
+    for name, (status, last) in runs.items():
+        count, seed = (int(number) for number in name[1:].split("_"))
+        write_run(out / "runs" / name, packing=(0.1, 0.1, last, last), status=status, count=count, seed=seed)
+    rows = json.loads(smarticles("measure", out, "--json").out)
+    assert [row["state"] for row in rows[::4]] == ["done", "failed", "stopped"]
+    lines = smarticles("measure", out).out.splitlines()
+    assert [line for line in lines if line.endswith(":")] == [
+        f"{out}/runs/n5_1:", f"{out}/runs/n5_2 (failed):", f"{out}/runs/n6_1 (stopped):"
+    ]  # fmt: skip
+    said = smarticles("measure", out, "--by", "count", "--phase", "last", "--table", table)
+    assert said.out.splitlines()[1].split()[:6] == ["5", "1", "1", "of", "2", "finished"]
+    assert said.out.splitlines()[2].split()[:6] == ["6", "0", "0", "of", "2", "finished"]
+    assert "note: 1 of 6 runs are finished, 3 missing, 1 failed, 1 stopped; means leave them out" in said.out
+    means = pd.read_csv(table, comment="#")
+    assert means["state"].tolist() == ["1 of 2 finished", "0 of 2 finished"]
+    assert means["phi second-highest-com [-]"].iloc[0] == pytest.approx(0.12)
+    assert pd.isna(means["phi second-highest-com [-]"].iloc[1])
+    everything = json.loads(
+        smarticles("measure", out, "--by", "count", "--phase", "last", "--unfinished", "--json").out
+    )
+    assert [row["phi second-highest-com [-]"] for row in everything] == pytest.approx([0.13, 0.16])
+    assert [row["runs [-]"] for row in everything] == [2, 1]
+    alone = smarticles("measure", out, "--unfinished")
+    assert (alone.status, "--unfinished: is for means over runs, which --by makes" in alone.err) == (2, True)
+
+
+def test_the_legend_is_about_columns_that_are_printed(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a", count=1)
+    out = smarticles("measure", run).out
+    assert "z: height" in out
+    assert not any(word in out for word in ("φ", "voxel", "voronoi", "peak F/nW"))
+    assert "of a pour" in out
+    assert "of a pour" not in smarticles("measure", run, "--phase", "shake").out
 
 
 def test_measure_keeps_the_tables_of_runs_that_have_not_changed(

@@ -96,5 +96,7 @@ def test_what_hangs_on_a_grip_is_picked_up() -> None:
     elongations = np.full(n, 0.01)
     elongations[:10] = math.nan  # before
     run, series = read({}, grip_moved_force_N=forces, grip_moved_count=np.full(n, 3), elongation_m=elongations)
-    assert values(grips.MEASURES[1], run, series) == pytest.approx({"gripped": 3.0, "picked up": 8.0})
+    assert values(grips.MEASURES[1], run, series) == pytest.approx(
+        {"gripped": 3.0, "gripped mass": 3 * MASS, "picked up": 8.0, "picked up mass": 8 * MASS}
+    )
     assert not grips.has_grips(series, 0)

@@ -116,6 +116,16 @@ def test_a_pull_that_has_just_begun_is_not_measured(tmp_path):
     assert "hook work [J]" not in summarise_run(Run(directory)).columns
 
 
+def test_what_is_left_on_a_hook_is_a_number_and_a_mass(tmp_path):
+    run = Run(write_hooked_run(tmp_path / "run", synthetic(), lambda time: HEIGHT + 0 * time))
+    row = summarise_run(run, costly="never").iloc[-1]
+    weight = row["hook load mass at the end [kg]"] * run.scene["gravity_m_per_s2"]
+    assert weight == pytest.approx(HEIGHT, rel=1e-6)
+    assert row["hook load mass at the end [kg]"] == pytest.approx(
+        row["hook load at the end [smarticles]"] * run.manifest.smarticle_mass_kg
+    )
+
+
 def test_only_a_force_limit_stops_a_hook_on_the_way(pulled):
     pull, farther = pulled(triangle), {"distance_m": 1.02 * DISTANCE}
     assert held_fast(pull.raised, {**farther, "force_limit_N": HEIGHT})

@@ -10,6 +10,7 @@ from postprocess.statistics.points import (
     SEED,
     SEEDS,
     averaged,
+    counted,
     format_with_error,
     mean_difference,
     means_by,
@@ -36,6 +37,17 @@ def test_means_carry_their_errors(group: pd.DataFrame) -> None:
     assert found["height [m]"] == 0.1
     assert math.isnan(found["height SE [m]"])
     assert seeds_of(group) == {SEEDS: 3, "seeds": "1 2 3"}
+
+
+def test_a_mean_of_fewer_runs_than_its_row_has_states_their_number() -> None:
+    runs = pd.DataFrame({"at": [1, 1, 1, 2], FORCE: [1.0, 2.0, 3.0, 4.0], "height [m]": [0.1, math.nan, 0.3, 0.4]})
+    runs["of another phase [J]"] = [math.nan] * 3 + [1.0]
+    means = means_by(runs, ["at"])
+    assert means["runs [-]"].tolist() == [3, 1]
+    assert means["height n [-]"].tolist() == [2, 1]
+    assert means["height [m]"].tolist() == pytest.approx([0.2, 0.4])
+    # None of its rows, or all of them, have a value.
+    assert {counted("of another phase [J]"), counted(FORCE)}.isdisjoint(means.columns)
 
 
 @pytest.mark.parametrize(
