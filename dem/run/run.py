@@ -7,6 +7,7 @@ import platform
 import subprocess
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from dem.errors import InputError, RunError
 from dem.plan.outlook import warnings_of
 from dem.record.checkpoint import Checkpoint, has_checkpoint, read_checkpoint
 from dem.record.document import HARDWARE, Done, Ended, Failed, Kind, Manifest, Phase, Start
-from dem.record.files import write_text
+from dem.record.files import write_text, write_whole
 from dem.record.names import DONE, FAILED, MANIFEST, SCENE, VTKHDF
 from dem.record.progress import ProgressWriter
 from dem.record.run import Run
@@ -81,7 +82,7 @@ def run_scene(
             made.write(out / MANIFEST, make_folder=True)
         if not (out / SCENE).exists():
             # A directory with a manifest counts as a run, which can be resumed if it was killed before this line.
-            write_text(out / SCENE, dump_scene(scene, out))
+            _keep_scene(scene, out)
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
             bar = ProgressWriter(out, scene.count, show=progress)
@@ -120,6 +121,12 @@ def run_scene(
 def _check_ready(scene: Scene) -> None:
     for phase in scene.phases:
         phase.ready(scene)
+
+
+def _keep_scene(scene: Scene, out: Path) -> None:
+    for name, content in filter(None, (phase.attached for phase in scene.phases)):
+        write_whole(out / name, partial(Path.write_bytes, data=content))
+    write_text(out / SCENE, dump_scene(scene, out, attached=True))
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
