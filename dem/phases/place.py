@@ -105,7 +105,7 @@ class Place(Part, Phase):
         try:
             poses = self._poses(scene)
         except InputError as error:
-            yield str(error)
+            yield f"phases.{index}.{error}"
             return
         yield from _misplaced(scene, poses, self._bodies)
 

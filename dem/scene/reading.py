@@ -36,6 +36,7 @@ NEWER_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
             "rest_s": 0.5,
         },
         "pull-hook": {"vibration": None},
+        "lift": {"bodies": None, "nodes": None},
     }
 )
 """Keys of phases that were added later, by type of phase, with their defaults; no protocol fills them in."""
