@@ -111,6 +111,7 @@ class Place(Part, Phase):
 
     def ready(self, scene: SceneView) -> None:
         try:
+            _ = self.attached  # the file may have changed since the scene was read
             poses = self._poses(scene)
         except InputError as error:
             raise InputError(f"phases.0.{error}") from None
