@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from dem.errors import InputError
 from dem.terminal import redraw, warn
 from smarticles.command_line import Cell, Commands, add_options, as_json, columns, names, reject_existing
-from smarticles.measuring import grouped, measured, of_phase, sources
+from smarticles.measuring import grouped, measured, of_phase, sources, usual_jobs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,7 +73,7 @@ that runs which have not changed are not measured again.""",
     )
     profile_help = "write φ(r, z) at the end of each phase, in rings and layers of the container, as CSV"
     measure.add_argument("--profile", type=Path, metavar="FILE.csv", help=profile_help)
-    add_options(measure, "--jobs", help="number of processes; default: one per core")
+    add_options(measure, "--jobs", help="number of processes; default: one per core, fewer where memory is short")
     add_options(measure, "--overwrite", "--json")
 
 
@@ -81,7 +81,6 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     """Print the measures of runs or write them to files; return the exit status."""
     import pandas as pd  # noqa: PLC0415
 
-    from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.record.run import Run, open_run  # noqa: PLC0415
     from postprocess.measures.profile import profile_table  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
@@ -96,7 +95,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     directories = list(sources(arguments.directories))
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
         warn(warning)
-    jobs = arguments.jobs or usable_cores()
+    jobs = arguments.jobs or usual_jobs(arguments.directories)
     table = measured(
         arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=_Progress()
     )
