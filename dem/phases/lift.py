@@ -41,12 +41,12 @@ class Lift(Part, Phase):
         description="least height of gripped nodes or bodies above the floor [m]; default: near, the mean height of "
         "the centres of mass; tails, or with bodies or nodes, 0",
     )
-    bodies: Annotated[tuple[Annotated[int, Field(ge=0)], ...], Field(min_length=1)] | None = Field(
+    bodies: Annotated[tuple[Annotated[int, Field(ge=0, lt=100_000)], ...], Field(min_length=1)] | None = Field(
         None,
         description="numbers, from 0, of the bodies that may be gripped, in the order in which they were added; "
         "default: all",
     )
-    nodes: Annotated[tuple[int, ...], Field(min_length=1)] | None = Field(
+    nodes: Annotated[tuple[Annotated[int, Field(ge=-201, le=200)], ...], Field(min_length=1)] | None = Field(
         None,
         description="numbers of the nodes of filaments, or links of chains, that may be gripped: from 0, or from -1 "
         "backwards; default: all",

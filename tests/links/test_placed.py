@@ -217,6 +217,18 @@ def test_a_run_goes_on_and_begins_anew_after_its_file_is_gone(tmp_path: Path) ->
     assert_goes_on(load_scene(whole.path / "scene.yaml"), whole, tmp_path / "stopped", 0.1)
 
 
+def test_a_frame_of_filaments_is_a_start(tmp_path: Path) -> None:
+    made = scene(tmp_path, [straight(12, 0.0025), straight(12, 0.0025, x=0.006)], HOLD, particle=WORM)
+    run_scene(made, tmp_path / "run", command="", progress=False)
+    frame = Run(tmp_path / "run").frames[6]
+    again = scene(tmp_path, [], count=2, particle=WORM, **{"phases.0.file": str(frame.path.relative_to(tmp_path))})
+    engine = build_engine(again, 1e-6)
+    again.phases[0].begin(again, 0).proceed(engine)
+    bodies = engine.state().bodies
+    assert bodies is not None
+    np.testing.assert_allclose(bodies.segments, frame.segments, atol=1e-12)
+
+
 def test_rigid_bodies_are_gripped_by_number(tmp_path: Path) -> None:
     rods = [straight(1, 0.01, x=x) for x in (-0.005, 0.0, 0.005)]
     lift = {"type": "lift", "bodies": [2, 0], "distance_m": 0.001, "speed_m_per_s": 0.02, "duration_s": 0.1}
