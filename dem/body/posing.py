@@ -9,6 +9,7 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array
+from dem.body.bars import JOINED
 from dem.body.kinds import Kind
 from dem.body.linear import matrix_product
 from dem.body.linkage import Joint, Linkage
@@ -41,15 +42,39 @@ def posed(body: Particle | Kind, segments: Array) -> Pose:
     if isinstance(body, Kind) and body.bends:
         return _of_bent(body, segments)
     local = body.bars.ends if isinstance(body, Kind) else _links(body)
-    positions, turns, off = fitted(local.reshape(-1, 3), segments.reshape(1, -1, 3))
-    if off[0] > MOST_OFF * 2 * body.radius:
-        lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
-        own = np.linalg.norm(local[:, 1] - local[:, 0], axis=1)
-        raise InputError(
-            f"its points are up to {1e3 * off[0]:.3g} mm off the {_name(body)}, at most {_allowed(body)} are allowed; "
-            f"{_lengths(lengths, own)}"
-        )
-    return Pose(positions[0], turns[0], None)
+    offs = []
+    for flip in (False, True):  # a path passes some bars from their end to their start
+        there = _directed(segments, local, flip=flip)
+        positions, turns, off = fitted(local.reshape(-1, 3), there.reshape(1, -1, 3))
+        if off[0] <= MOST_OFF * 2 * body.radius:
+            return Pose(positions[0], turns[0], None)
+        offs.append(float(off[0]))
+    lengths, own = (np.linalg.norm(bars[:, 1] - bars[:, 0], axis=1) for bars in (segments, local))
+    raise InputError(
+        f"its points are up to {1e3 * min(offs):.3g} mm off the {_name(body)}, at most {_allowed(body)} are allowed; "
+        f"{_lengths(lengths, own)}"
+    )
+
+
+def _directed(segments: Array, local: Array, *, flip: bool) -> Array:
+    """Return bars (S, 2, 3), each from its start to its end, where bars of the shape `local` (S, 2, 3) have theirs.
+
+    The first bar is reversed if `flip`. Others are directed such that bars with a common end in the shape have it here.
+    """
+    found, todo = segments.copy(), set(range(1, len(segments)))
+    found[0] = found[0, ::-1] if flip else found[0]
+    known = [0]
+    for j in known:
+        for k in sorted(todo):
+            apart = np.linalg.norm(local[j][:, None] - local[k], axis=-1)
+            a, b = np.unravel_index(apart.argmin(), apart.shape)
+            if apart[a, b] > JOINED * np.linalg.norm(local[j, 1] - local[j, 0]):
+                continue
+            ways = np.linalg.norm(found[k] - found[j, a], axis=-1)
+            found[k] = found[k, ::-1] if ways[1 - b] < ways[b] else found[k]
+            todo.remove(k)
+            known.append(k)
+    return found
 
 
 def _links(particle: Particle) -> Array:

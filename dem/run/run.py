@@ -187,8 +187,8 @@ def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None
     changes = _note_start(out, start.model_copy(update={"time_s": simulation.engine.time}))
     if changes:
         simulation.warn(
-            f"resumed by others than those that began: {', '.join(changes)}; it continues, but results may differ from "
-            "those of a run that was never stopped"
+            f"resumed with {', '.join(changes)}; it continues, but results may differ from those of a run that was "
+            "never stopped"
         )
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
 

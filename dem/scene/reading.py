@@ -37,6 +37,7 @@ NEWER_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         },
         "pull-hook": {"vibration": None},
         "lift": {"bodies": None, "nodes": None},
+        "tension": {"bodies": None},
     }
 )
 """Keys of phases that were added later, by type of phase, with their defaults; no protocol fills them in."""

@@ -239,3 +239,21 @@ def test_rigid_bodies_are_gripped_by_number(tmp_path: Path) -> None:
     np.testing.assert_allclose(frame.segments[[0, 2], 0, 2], 0.051, atol=1e-6)
     assert frame.segments[1, 0, 2] < 0.04
     assert run.series["grip_moved_count"][-1] == 2
+
+
+def test_two_bodies_hooked_into_each_other_are_pulled_apart_by_number(tmp_path: Path) -> None:
+    crown, leg = 0.011, 0.007
+    staple = {"shape": "staple", "crown_m": crown, "leg_m": leg, "diameter_m": 1e-3}
+    low, high = 0.02, 0.025
+    # One opens upwards, the other downwards and across; their crowns are apart by the length of a leg at most.
+    up = [(-crown / 2, 0, low + leg), (-crown / 2, 0, low), (crown / 2, 0, low), (crown / 2, 0, low + leg)]
+    down = [(0, -crown / 2, high - leg), (0, -crown / 2, high), (0, crown / 2, high), (0, crown / 2, high - leg)]
+    third = [(x + 0.012, y, z - 0.015) for x, y, z in up]
+    pull = {"type": "tension", "bodies": [[1], [0]], "distance_m": 0.003, "speed_m_per_s": 0.05}
+    made = scene(tmp_path, [up, down, third], pull, particle=staple)
+    run_scene(made, tmp_path / "run", command="", progress=False)
+    series = Run(tmp_path / "run").series
+    held = np.flatnonzero(np.isfinite(series["elongation_m"]))
+    assert (series["grip_fixed_count"][held] == 1).all()
+    assert (series["grip_moved_count"][held] == 1).all()
+    assert series["elongation_m"][held][-1] == pytest.approx(0.003, rel=0.1)

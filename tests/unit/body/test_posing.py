@@ -50,6 +50,27 @@ def test_a_rigid_body_is_found_where_it_was_put(name: str) -> None:
     assert pose.bent is None
 
 
+def test_points_in_a_row_are_a_staple_though_its_legs_begin_at_the_crown() -> None:
+    crown, (first, second) = 0.014, (0.005, 0.007)
+    points = np.array([(-crown / 2, first, 0), (-crown / 2, 0, 0), (crown / 2, 0, 0), (crown / 2, second, 0)])
+    points = turned(points)
+    body = body_of(SHAPES["staple"])
+    assert isinstance(body, Kind)
+    pose = posed(body, np.stack([points[:-1], points[1:]], axis=1))
+    placed = body.bars.ends @ pose.turn.T + pose.position
+    np.testing.assert_allclose(placed, [points[[1, 0]], points[[1, 2]], points[[2, 3]]], atol=1e-12)
+
+
+@pytest.mark.parametrize("reversed_bars", [[], [0], [1, 2], [0, 1, 2]])
+def test_bars_of_a_star_may_be_given_from_either_end(reversed_bars: list[int]) -> None:
+    body = body_of(SHAPES["tripod"])
+    assert isinstance(body, Kind)
+    segments = turned(body.bars.ends)
+    segments[reversed_bars] = segments[reversed_bars, ::-1]
+    pose = posed(body, segments)
+    np.testing.assert_allclose(pose.turn, TURN.as_matrix(), atol=1e-9)
+
+
 def helix(count: int, step: float) -> NDArray[np.float64]:
     """Points in space at equal distances along a helix."""
     turns = 0.5 * np.arange(count)

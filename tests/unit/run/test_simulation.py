@@ -201,7 +201,7 @@ def test_each_start_is_recorded_with_its_version_and_machine(
         *("resumed by smarticles 0.4.0", "resumed by smarticles 0.4.0"),
     ]
     assert "; on three, " in by[2]
-    warned = [line.split(": ", 1)[1] for line in lines if "resumed by others" in line]
+    warned = [line.split("WARNING resumed with ")[1] for line in lines if "WARNING resumed with " in line]
     assert [line.split(";")[0] for line in warned] == [
         "smarticles 0.3.0 instead of 0.2.0",
         "smarticles 0.4.0 instead of 0.2.0, --threads 2 instead of 1",
@@ -229,7 +229,7 @@ def test_a_run_that_another_version_began_anew_is_its_own(
     monkeypatch.setattr("dem.run.run.version", lambda _name: "0.3.0")
     run(scene_of("rested"), tmp_path, resume=True)
     assert Run(tmp_path).manifest.made_by["smarticles"] == "0.3.0"
-    assert "resumed by others" not in (tmp_path / "log.txt").read_text()
+    assert "resumed with" not in (tmp_path / "log.txt").read_text()
 
 
 def test_a_run_asked_to_stop_does_so_at_its_next_checkpoint(
