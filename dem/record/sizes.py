@@ -6,12 +6,12 @@ MIB = 2**20
 
 # Measured with meshio's compressed files of 10 to 1200 bars.
 _FRAME, _BAR = 2500, 110  # bytes
-# Peak memory of a process, measured with 150 to 600 smarticles and 100 to 400 rods; libraries take 140 MiB of it.
+# Peak memory of a process, measured with 150 to 600 smarticles and 400 rods, and 10 % more; libraries take 140 MiB.
 # Voronoi cells, of smarticles in a cylinder alone, take most; they are computed in parts from some 2000 smarticles on.
 _LIBRARIES, _PER_BAR = 150 * MIB, MIB // 25
-_CELLS, _PER_SMARTICLE, _MOST_CELLS = 50 * MIB, 7 * MIB // 10, 1300 * MIB
+_CELLS, _PER_SMARTICLE, _MOST_CELLS = 40 * MIB, 36 * MIB // 100, 900 * MIB
 # Processor time for each phase: of cells for each smarticle, and of the rest for each bar [s].
-_SECONDS_PER_SMARTICLE, _SECONDS_PER_BAR = 0.005, 0.0002
+_SECONDS_PER_SMARTICLE, _SECONDS_PER_BAR = 0.003, 0.0002
 
 
 @dataclass(frozen=True)
