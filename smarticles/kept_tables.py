@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _READ = (SCENE, MANIFEST, DONE, FAILED, SERIES, VTKHDF, collection(FRAME), collection(FORCE))
 
+_PIECE = 2**20  # bytes
+
 
 def key_of(directory: Path) -> str:
     """Return a hash of all files that measures of a run read, and of the program that measures."""
@@ -28,7 +30,10 @@ def key_of(directory: Path) -> str:
     for path in (*(directory / name for name in _READ), *members):
         if path.is_file():
             content.update(f"\n{path.name} {path.stat().st_size}\n".encode())
-            content.update(path.read_bytes())
+            # In pieces: one file may hold all frames.
+            with path.open("rb") as file:
+                while piece := file.read(_PIECE):
+                    content.update(piece)
     return content.hexdigest()
 
 

@@ -14,11 +14,14 @@ from typing import TYPE_CHECKING, Any
 from dem.display import Steps, silent
 from dem.errors import InputError, nearest
 from dem.record.names import FRAME, OF_SWEEP, VTKHDF, collection
+from dem.record.sizes import aftermath
 from smarticles.kept_tables import keep, key_of, read_kept
+from smarticles.memory import free_memory
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from dem.record.document import Manifest
     from postprocess.measures.registry import FrameMeasure
     from postprocess.measures.table import Costly
     from templates.sweep.folder import Folder
@@ -26,6 +29,8 @@ if TYPE_CHECKING:
 _MIN_RUNS_FOR_PROCESSES = 6  #: With fewer runs, loading the libraries in each process takes longer than it saves
 
 STATE, DONE = "state", "done"  #: Column with the state of a run, and the state of a finished run
+SHARE = 0.8  #: Part of the free memory that processes may take together
+
 PHASE = ("phase", "phase type")  #: Columns that identify a phase within a run
 
 
@@ -76,6 +81,30 @@ def states(directories: Sequence[Path]) -> pd.DataFrame:
             cells = {name: _cell(value) for name, value in values.items()}
             rows.append({**cells, "run": str(run), STATE: run_status(run).state})
     return pd.DataFrame(rows)
+
+
+def usual_jobs(directories: Sequence[Path]) -> int:
+    """Return the default number of processes that measure runs and sweeps: one per core, as far as memory allows.
+
+    InputError if a sweep has no frames.
+    """
+    from dem.engine.cores import usable_cores  # noqa: PLC0415
+    from dem.record.run import Run  # noqa: PLC0415
+
+    free = free_memory()
+    needed = [_memory_of(Run(directory).manifest) for directory in sources(directories)]
+    if free is None or not needed:
+        return usable_cores()
+    return max(1, min(usable_cores(), int(SHARE * free) // max(needed)))
+
+
+def _memory_of(made: Manifest) -> int:
+    """Return the memory of a process that measures a run [bytes]."""
+    from dem.body.particle import LINKS  # noqa: PLC0415
+
+    kinds, cells = made.kinds, made.kinds is None and not made.planar and made.container_tiers == 1
+    bars = LINKS * made.count if kinds is None else sum(kind.bodies * kind.bars for kind in kinds)
+    return aftermath(made.count, bars, len(made.phases), cells=cells).memory_bytes
 
 
 def values_in(folder: Folder) -> dict[str, list[Any]]:

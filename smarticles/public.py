@@ -476,7 +476,7 @@ def _read_scene_file(path: Path) -> dict[str, Any]:
         raise InputError(f"{path}: a scene is a mapping of keys to values, got {type(data).__name__}")
     phases = data["phases"] if isinstance(data.get("phases"), list) else ()
     # These paths are relative to the scene file, and the template is in another folder.
-    for part, key in [(data.get("contact"), PRESET), *((phase, "run") for phase in phases)]:
+    for part, key in [(data.get("contact"), PRESET), *((phase, key) for phase in phases for key in ("run", "file"))]:
         if isinstance(part, dict) and isinstance(part.get(key), str):
             part[key] = str((path.parent / part[key]).resolve())
     return data

@@ -165,16 +165,16 @@ def is_for_cluster(arguments: argparse.Namespace, *, allow_ranks: bool = False) 
 def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argparse.Namespace) -> Draft:
     """Plan and render a cluster job for runs of a sweep; write nothing.
 
-    Without --cluster the cluster is that of the latest job in the directory `path`. InputError if there is neither, or
-    the request exceeds limits of the cluster.
+    Cluster and options that are not given are those of the latest job in the directory `path`; options hold on the
+    cluster that they were given for. InputError if there is no cluster, or the request exceeds limits of the cluster.
     """
     from templates.slurm.cluster import shipped_clusters  # noqa: PLC0415
     from templates.slurm.job import Wishes  # noqa: PLC0415
-    from templates.slurm.submission import draft, submissions  # noqa: PLC0415
+    from templates.slurm.submission import draft, resolved, submissions  # noqa: PLC0415
 
+    earlier = submissions(path)
     reference = arguments.cluster
     if reference is None:
-        earlier = submissions(path)
         if not earlier:
             msg = f"--cluster: is missing; known: {', '.join(shipped_clusters())}; or a file FILE.toml"
             raise InputError(msg)
@@ -187,6 +187,8 @@ def draft_of(path: Path, name: str, entries: Sequence[Entry], arguments: argpars
         memory_mib=arguments.memory,
         ranks=arguments.ranks,
     )
+    if earlier and earlier[-1].cluster == resolved(reference):
+        wishes = wishes.completed(earlier[-1].wishes)
     return draft(path, name, entries, reference, wishes)
 
 

@@ -79,8 +79,8 @@ def shipped_scenes() -> list[dict[str, Any]]:
     blocks = [load_yaml(text) for page in pages for text in re.findall(r"```yaml\n(# \S+: .*?)```", page, re.DOTALL)]
     return [
         *(yaml.safe_load(dump_scene(scene)) for scene in scenes),
-        # A scene that takes over the end of another run needs this run.
-        *(block for block in blocks if "phases" in block and block["phases"][0]["type"] != "take-over"),
+        # Scenes that begin with another run or a file of poses need it.
+        *(block for block in blocks if "phases" in block and block["phases"][0]["type"] not in ("place", "take-over")),
     ]
 
 

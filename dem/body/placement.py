@@ -21,12 +21,22 @@ MOST_GROWTH = 40  # increases of the slab's height before placement fails
 
 
 @dataclass(frozen=True)
+class Bent:
+    """Shape of a body that bends, where it is not the shape in which it is poured."""
+
+    points: Array  #: (n, 3) nodes of a filament, or middles of the links of a linkage [m]
+    turns: Array | None = None  #: (n, 3, 3) frames of the links of a linkage, x along each and z its normal
+    angles: Array | None = None  #: (n - 1, 3) angles about the axes of its joints [rad]
+
+
+@dataclass(frozen=True)
 class Poses:
     """Poses of k bodies."""
 
     positions: Array  #: (k, 3) centres of mass [m]
     rotations: tuple[Rotation, ...]  #: k rotations from the body frame to the laboratory frame
     kinds: Numbers | None = None  #: (k,) kind of each body in a mixture; None: smarticles
+    bent: tuple[Bent, ...] | None = None  #: k shapes of bodies that bend; None: as they are poured
 
 
 def place_layer(
@@ -113,12 +123,21 @@ def fitted_poses(boxes: Boxes, vertices: Array) -> tuple[Poses, Array]:
 
     Source: Horn, J. Opt. Soc. Am. A 4, 629 (1987).
     """
-    centre, shape_centre = vertices.mean(axis=1), boxes.vertices.mean(axis=0)
-    turns = _turns(np.einsum("nvi,vj->nij", vertices - centre[:, None], boxes.vertices - shape_centre))
-    positions = centre - applied(turns, shape_centre[None])[:, 0]
-    fitted = np.einsum("nij,vj->nvi", turns, boxes.vertices) + positions[:, None]
-    deviations: Array = np.linalg.norm(fitted - vertices, axis=-1).max(axis=1)
+    positions, turns, deviations = fitted(boxes.vertices, vertices)
     return Poses(positions, tuple(Rotation.from_matrix(turn) for turn in turns)), deviations
+
+
+def fitted(shape: Array, points: Array) -> tuple[Array, Array, Array]:
+    """Fit the poses of a rigid shape, points (V, 3) in its frame [m], to those of N bodies (N, V, 3), by least squares.
+
+    Returns positions (N, 3) of the frame [m], rotations (N, 3, 3), and the largest distance (N,) of a fitted point [m].
+    """
+    centre, shape_centre = points.mean(axis=1), shape.mean(axis=0)
+    turns = _turns(np.einsum("nvi,vj->nij", points - centre[:, None], shape - shape_centre))
+    positions = centre - applied(turns, shape_centre[None])[:, 0]
+    placed = np.einsum("nij,vj->nvi", turns, shape) + positions[:, None]
+    deviations: Array = np.linalg.norm(placed - points, axis=-1).max(axis=1)
+    return positions, turns, deviations
 
 
 def _turns(moments: Array) -> Array:

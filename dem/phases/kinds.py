@@ -9,6 +9,7 @@ from dem.phases.arrange import Arrange
 from dem.phases.compress import Compress
 from dem.phases.deposit import Deposit
 from dem.phases.lift import Lift, Release
+from dem.phases.place import Place
 from dem.phases.pull_hook import PullHook
 from dem.phases.relax import Relax
 from dem.phases.remove_container import RemoveContainer
@@ -21,6 +22,7 @@ from dem.phases.wriggle import Wriggle
 
 AnyPhase = Annotated[
     Deposit
+    | Place
     | TakeOver
     | Relax
     | Shake

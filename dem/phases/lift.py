@@ -2,10 +2,10 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from dem.arrays import Array, Flags
 from dem.engine.effect import EffectName
@@ -13,7 +13,7 @@ from dem.engine.interface import Engine, Filaments, Grips
 from dem.phases.compress import Compress, check_plate_is_gone
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
 from dem.phases.travel import reject_early_end, travel_time, travel_to_text
-from dem.setting.part import Duration, Length, Part, Speed
+from dem.setting.part import LONGEST_LENGTH, Duration, Length, Part, Speed, reject_wrong_unit
 
 
 class Lift(Part, Phase):
@@ -39,9 +39,21 @@ class Lift(Part, Phase):
         ge=0,
         le=1.0,
         description="least height of gripped nodes or bodies above the floor [m]; default: near, the mean height of "
-        "the centres of mass; tails, 0",
+        "the centres of mass; tails, or with bodies or nodes, 0",
     )
-    distance_m: Length = Field(..., description="how far they are raised [m]")
+    bodies: Annotated[tuple[Annotated[int, Field(ge=0, lt=100_000)], ...], Field(min_length=1)] | None = Field(
+        None,
+        description="numbers, from 0, of the bodies that may be gripped, in the order in which they were added; "
+        "default: all",
+    )
+    nodes: Annotated[tuple[Annotated[int, Field(ge=-201, le=200)], ...], Field(min_length=1)] | None = Field(
+        None,
+        description="numbers of the nodes of filaments, or links of chains, that may be gripped: from 0, or from -1 "
+        "backwards; default: all",
+    )
+    distance_m: Annotated[
+        float, Field(ge=0, json_schema_extra={"maximum": LONGEST_LENGTH}), AfterValidator(reject_wrong_unit)
+    ] = Field(..., description="how far they are raised [m]; 0: they are held where they are")
     speed_m_per_s: Speed = Field(..., description="speed of the grip [m/s]")
     duration_s: Duration = Field(
         default_factory=travel_time,
@@ -57,6 +69,10 @@ class Lift(Part, Phase):
         yield from check_plate_is_gone(scene, index)
         if self.grips == "tails" and not _bends(scene):
             yield f"phases.{index}.grips: tails are those of filaments; use near for rigid bodies"
+        if self.bodies is not None and max(self.bodies) >= scene.count:
+            yield f"phases.{index}.bodies: there is no body {max(self.bodies)}; use 0 to {scene.count - 1}"
+        if self.nodes is not None:
+            yield from self._check_nodes(scene, f"phases.{index}.nodes")
         for later, phase in enumerate(scene.phases[index:], index):
             if phase.lets_go:
                 return
@@ -70,6 +86,16 @@ class Lift(Part, Phase):
                     f"phases.{later}: {phase.kind} moves barbs of smarticles that phases.{index} (lift) still grips; "
                     "add release before"
                 )
+
+    def _check_nodes(self, scene: SceneView, key: str) -> Iterator[str]:
+        if scene.mixture is None or not scene.mixture.bends:
+            yield f"{key}: rigid bodies are gripped as a whole; leave nodes out, or choose bodies"
+            return
+        if self.grips == "tails":
+            yield f"{key}: tails are the last nodes; leave nodes or grips out"
+        least = min(len(kind.bars.points) + (kind.filament is not None) for kind in scene.mixture.kinds)
+        if wrong := [number for number in self.nodes or () if not -least <= number < least]:
+            yield f"{key}: there is no {wrong[0]} in a body of {least}; use 0 to {least - 1}, or -1 to {-least}"
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
         if _bends(scene):
@@ -109,10 +135,8 @@ class Lift(Part, Phase):
         else:
             assert engine.grips is not None  # the scene calls for them
             engine.motors.weld()
-            bodies, what = (
-                np.flatnonzero(self._near(engine, engine.state().positions)).tolist(),
-                "body has its centre of mass where",
-            )
+            near = self._near(engine, engine.state().positions) & self._chosen(engine.count)
+            bodies, what = np.flatnonzero(near).tolist(), "body has its centre of mass where"
             memory["grip"], empty = engine.grips.hold(bodies), not bodies
         if empty:
             memory["warning"] = f"nothing was gripped: no {what} phases.{index} grips; raise radius_m or lower above_m"
@@ -120,19 +144,24 @@ class Lift(Part, Phase):
     def _near(self, engine: Engine, places: Array) -> Flags:
         """Return (n,) whether places (n, 3) [m] are within `radius_m` of the axis and high enough."""
         floor, state = engine.boundaries.floor, engine.state()
-        least = self.above_m
+        least, anywhere = self.above_m, self.grips == "tails" or self.bodies is not None or self.nodes is not None
         if least is None:
-            least = 0.0 if self.grips == "tails" else float(state.positions[:, 2].mean()) - floor
+            least = 0.0 if anywhere else float(state.positions[:, 2].mean()) - floor
         radius = math.inf if self.radius_m is None else self.radius_m
         return (np.hypot(places[:, 0], places[:, 1]) <= radius) & (places[:, 2] - floor >= least)
+
+    def _chosen(self, count: int) -> Flags:
+        """Return (N,) whether each body may be gripped."""
+        return np.ones(count, np.bool_) if self.bodies is None else np.isin(np.arange(count), self.bodies)
 
     def _nodes(self, engine: Engine, filaments: Filaments) -> dict[int, list[int]]:
         """Return the numbers of the nodes or links to grip, by the number of their filament or chain."""
         found = {}
-        for k in range(engine.count):
+        for k in np.flatnonzero(self._chosen(engine.count)).tolist():
             near = self._near(engine, filaments.points(k))
-            if self.grips == "tails":
-                near[:-1] = False
+            wanted = (-1,) if self.grips == "tails" else self.nodes
+            if wanted is not None:
+                near &= np.isin(np.arange(len(near)), np.arange(len(near))[list(wanted)])
             if near.any():
                 found[k] = np.flatnonzero(near).tolist()
         return found

@@ -108,6 +108,14 @@ class Phase:
         """Raise InputError before a run if a source of the phase, such as another run, is missing or changed."""
 
     @property
+    def attached(self) -> tuple[str, bytes] | None:
+        """Name and content of the file that the phase reads, of which the run directory keeps a copy; None: no file.
+
+        InputError if it is missing or changed.
+        """
+        return None
+
+    @property
     def origin(self) -> Mapping[str, Any] | None:
         """Data about the other run from which smarticles are taken, for the manifest; None if none are."""
         return None

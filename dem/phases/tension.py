@@ -1,7 +1,7 @@
 """The phase that pulls the pile apart between two grips."""
 
 from collections.abc import Iterator, Mapping
-from typing import ClassVar, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -23,22 +23,31 @@ from dem.phases.travel import (
 from dem.setting.part import Duration, Force, Length, Part, Speed
 from dem.setting.vibration import Vibration
 
+Held = Annotated[tuple[Annotated[int, Field(ge=0, lt=100_000)], ...], Field(min_length=1)]
 MOVED = 1  # number of the grip that moves; the grip at rest is 0, since all others are released before
 
 
 class Tension(Part, Phase):
     """Hold both ends of the pile by grips, and move one away at constant speed, with smarticles welded.
 
-    A grip holds the bodies whose centre of mass is within `grip_m` of the outermost one at its end. They move with the
-    grip and do not turn. The grip at the bottom, or at lower x or y, rests. At the end of the phase both are released.
+    A grip holds the bodies whose centre of mass is within `grip_m` of the outermost one at its end, or those of its
+    list in `bodies`. They move with the grip and do not turn. The grip at the bottom, or at lower x or y, or of the
+    first list, rests. At the end of the phase both are released.
     """
 
     lets_go: ClassVar[bool] = True
     needs_links: ClassVar[str] = "grips of rigid bodies"
     type: Literal["tension"]
     axis: Literal["x", "y", "z"] = Field("z", description="direction of the pull")
-    grip_m: Length = Field(
-        ..., description="distance along the axis from the outermost centre of mass within which bodies are held [m]"
+    grip_m: Length | None = Field(
+        None,
+        description="distance along the axis from the outermost centre of mass within which bodies are held [m]; "
+        "needed unless bodies are given",
+    )
+    bodies: tuple[Held, Held] | None = Field(
+        None,
+        description="numbers, from 0, of the bodies that the grip at rest holds, and of those that the moving grip "
+        "holds; default: by grip_m",
     )
     distance_m: Length = Field(..., description="how far the grip moves [m]")
     speed_m_per_s: Speed = Field(..., description="speed of the grip [m/s]")
@@ -52,6 +61,14 @@ class Tension(Part, Phase):
         "null: no limit. The pull is unbounded when a chain of rigid bodies holds both grips",
     )
     vibration: Vibration | None = Field(None, description="vibration of the container meanwhile; null: none")
+
+    @model_validator(mode="after")
+    def _holds(self) -> Self:
+        if (self.grip_m is None) == (self.bodies is None):
+            raise ValueError("grip_m: give it, or bodies, but not both; they say what is held at either end")
+        if self.bodies is not None and (twice := set(self.bodies[0]) & set(self.bodies[1])):
+            raise ValueError(f"bodies: {min(twice)} is in both grips; give each body to one of them")
+        return self
 
     @model_validator(mode="after")
     def _arrives(self) -> Self:
@@ -68,6 +85,8 @@ class Tension(Part, Phase):
             )
         if self.axis == "z":
             yield from check_plate_is_gone(scene, index)
+        if self.bodies is not None and (most := max(map(max, self.bodies))) >= scene.count:
+            yield f"phases.{index}.bodies: there is no body {most}; use 0 to {scene.count - 1}"
         if scene.count < 2:
             yield f"count: {scene.count} smarticle, but phases.{index} (tension) holds one at each end; use at least 2"
 
@@ -80,7 +99,8 @@ class Tension(Part, Phase):
 
     def calls(self, scene: SceneView, index: int) -> Mapping[EffectName, str]:
         travel = travel_to_text(self.distance_m, self.speed_m_per_s, self.force_limit_N)
-        why = f"phase {index} moves one along {self.axis} {travel}; each holds {1e3 * self.grip_m:.3g} mm of the pile"
+        what = "chosen bodies" if self.grip_m is None else f"{1e3 * self.grip_m:.3g} mm of the pile"
+        why = f"phase {index} moves one along {self.axis} {travel}; each holds {what}"
         return {EffectName.GRIPS: why, **self.vibrating(scene, index)}
 
     def first_memory(self, scene: SceneView) -> Memory:
@@ -135,6 +155,9 @@ class Tension(Part, Phase):
 
     def _ends(self, stage: Stage, engine: Engine) -> tuple[list[int], list[int]]:
         """Return the numbers of the bodies at the end that rests and at the end that moves."""
+        if self.grip_m is None:
+            assert self.bodies is not None  # the phase was checked
+            return list(self.bodies[0]), list(self.bodies[1])
         places = engine.state().positions[:, self._along]
         low, high = float(places.min()), float(places.max())
         if high - low <= 2 * self.grip_m:

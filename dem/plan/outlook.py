@@ -4,11 +4,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
+from dem.body.particle import LINKS
 from dem.engine.effect import Adds
 from dem.engine.kinds import engine_kind
 from dem.plan.doubts import doubts_of
 from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
+from dem.record.sizes import MIB, Aftermath, aftermath
 from dem.scene.scene import Scene
 from dem.scene.stiffness import expected_overlaps, too_soft
 from dem.setting.fidelity import Fidelity
@@ -51,6 +53,7 @@ class Plan:
     effects: tuple[Decision, ...]
     engines: tuple[str, ...]
     frames: int
+    after: Aftermath  #: What measures of the run will take
     wall_s: float  #: Expected wall time of all phases, without `start_s` and `compile_s`
     warnings: tuple[str, ...]
     planar: bool = False
@@ -108,9 +111,19 @@ class Plan:
         for effect in self.effects:
             lines.append(f"{effect.name:<20}{'on' if effect.on else 'off':<5}{effect.why}")
             lines += [f"{'':<25}+ {added}"] if (added := effect.adds.to_text()) else []
-        lines += ["", "engines: " + ", ".join(self.engines), f"frames: about {self.frames}"]
+        lines += ["", "engines: " + ", ".join(self.engines), *self._after_to_text()]
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
+
+    def _after_to_text(self) -> list[str]:
+        """Return lines about the frames, and about the memory and time that measures take."""
+        after = self.after
+        size, whole = (_size(number) for number in (after.frame_bytes, self.frames * after.frame_bytes))
+        return [
+            f"frames: about {self.frames} of {size}, {whole} together",
+            f"smarticles measure: about {_size(after.memory_bytes)} of memory in each process, "
+            f"{_wall_time(after.cpu_s)} of processor time for each run",
+        ]
 
     def _engine_to_text(self) -> list[str]:
         """Return lines about the engine, and about the fidelity if the engine is links; no lines for YADE.
@@ -137,6 +150,14 @@ def _wall_time(wall: float) -> str:
         if wall < most:
             return f"{wall / unit:{form}} {name}"
     return f"{wall / 3600:.1f} h" if wall < 10 * 3600 else f"{wall / 3600:.0f} h"
+
+
+def _size(number: int) -> str:
+    """Return a number of bytes as text, in kiB, MiB or GiB."""
+    for unit, name in ((MIB * 1024, "GiB"), (MIB, "MiB")):
+        if number >= unit:
+            return f"{number / unit:.3g} {name}"
+    return f"{number / 1024:.3g} kiB"
 
 
 def _strands(number: int) -> str:
@@ -183,6 +204,7 @@ def plan(scene: Scene) -> Plan:
         effects=effects,
         engines=tuple(sorted(engines, key=kind.order.index)),
         frames=round(sum(phase.estimate_s for phase in phases) / scene.recording.frame_interval_s),
+        after=_after(scene),
         wall_s=sum(phase.wall_s for phase in phases),
         warnings=warnings_of(scene),
         planar=scene.plane is not None,
@@ -198,6 +220,13 @@ def plan(scene: Scene) -> Plan:
         compile_s=kind.seconds_to_compile(scene),
         overlaps={overlap.cause: overlap.widths for overlap in expected_overlaps(scene)},
     )
+
+
+def _after(scene: Scene) -> Aftermath:
+    mixture = scene.mixture
+    bars = LINKS * scene.count if mixture is None else int(mixture.sizes[mixture.of].sum())
+    cells = mixture is None and scene.plane is None and not scene.cylinder.upper
+    return aftermath(scene.count, bars, len(scene.phases), cells=cells)
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import suppress
+from itertools import groupby
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
@@ -80,6 +81,26 @@ class Kind(Document):
         return self.shape == "filament"
 
 
+class Start(Document):
+    """One start of a run, at its beginning or at a resume."""
+
+    started: str  #: Date and time
+    time_s: NonNegativeFloat = 0.0  #: Simulated time from which it goes on
+    machine: str | None = None  #: Name of the machine; None: not recorded
+    command: str
+    threads: NonNegativeInt
+    versions: Mapping[str, str]
+
+    def to_text(self) -> str:
+        """Return program, engine and machine as text."""
+        software = [f"{name} {number}" for name, number in self.versions.items() if name not in HARDWARE]
+        machine = [part for part in (self.machine, self.versions.get("processor")) if part]
+        return ", ".join(software) + (f"; on {', '.join(machine)}" if machine else "")
+
+
+HARDWARE = ("processor", "blas")  #: Names in `Start.versions` that follow from the machine
+
+
 class Manifest(Document):
     """Manifest of a run, `run.json`: how it was made, and numbers of its scene."""
 
@@ -118,12 +139,42 @@ class Manifest(Document):
     phases: tuple[Phase, ...]
     kinds: tuple[Kind, ...] | None = None  #: Kinds of bodies; None: the bodies are smarticles
     taken_over: Mapping[str, Any] | None = None  #: `Phase.origin`: the run from which smarticles were taken
+    machine: str | None = None  #: Name of the machine that started the run; None: not recorded
+    resumed: tuple[Start, ...] = ()  #: Later starts; the keys above describe the first one
 
     @model_validator(mode="after")
     def _numbered(self) -> Self:
         if [phase.index for phase in self.phases] != list(range(len(self.phases))):
             raise ValueError("'phases' must be numbered 0, 1, 2, …")
         return self
+
+    @property
+    def starts(self) -> tuple[Start, ...]:
+        """All starts in order."""
+        first = {name: getattr(self, name) for name in ("started", "machine", "command", "threads", "versions")}
+        return (Start(**first), *self.resumed)
+
+    @property
+    def makers(self) -> tuple[Start, ...]:
+        """The starts that made what is recorded: a later start replaces all from its simulated time on."""
+        kept: list[Start] = []
+        for start in reversed(self.starts):
+            if not kept or start.time_s < kept[-1].time_s:
+                kept.append(start)
+        return tuple(reversed(kept))
+
+    @property
+    def made_by(self) -> dict[str, str]:
+        """Versions by name, machine and threads of all that made the run, such as `0.2.0 (resumed by 0.3.0)`."""
+        each = [
+            {**start.versions, **({"machine": start.machine} if start.machine else {}), "threads": str(start.threads)}
+            for start in self.makers
+        ]
+        found = {}
+        for name in dict.fromkeys(name for one in each for name in one):
+            first, *others = [value for value, _ in groupby(one.get(name, "unknown") for one in each)]
+            found[name] = f"{first} (resumed by {', '.join(others)})" if others else first
+        return found
 
     @property
     def thicknesses_in_plane_m(self) -> tuple[float, float, float]:

@@ -7,6 +7,7 @@ import platform
 import subprocess
 from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -20,8 +21,8 @@ from dem.engine.kinds import engine_kind
 from dem.errors import InputError, RunError
 from dem.plan.outlook import planned_phases, warnings_of
 from dem.record.checkpoint import Checkpoint, has_checkpoint, read_checkpoint
-from dem.record.document import Done, Ended, Failed, Kind, Manifest, Phase
-from dem.record.files import write_text
+from dem.record.document import HARDWARE, Done, Ended, Failed, Kind, Manifest, Phase, Start
+from dem.record.files import write_text, write_whole
 from dem.record.names import DONE, FAILED, MANIFEST, SCENE, VTKHDF
 from dem.record.progress import PhaseCost, ProgressWriter
 from dem.record.run import Run
@@ -82,7 +83,7 @@ def run_scene(
             made.write(out / MANIFEST, make_folder=True)
         if not (out / SCENE).exists():
             # A directory with a manifest counts as a run, which can be resumed if it was killed before this line.
-            write_text(out / SCENE, dump_scene(scene, out))
+            _keep_scene(scene, out)
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
             bar = ProgressWriter(out, scene.count, costs=_costs(scene), display=display)
@@ -98,10 +99,12 @@ def run_scene(
                     time_steps=steps,
                     stop=stop or StopRequest(),
                 )
+                start = start_of(command=command, made_by=made_by, threads=threads)
+                log.info("%s by %s", "resumed" if resume else "started", start.to_text())
                 for warning in warnings_of(scene):
                     simulation.warn(warning)
                 if resume:
-                    _restore(simulation, saved, threads)
+                    _restore(simulation, saved, start)
                 phases, engine = simulation.run(), simulation.engine
                 wall, cpu = simulation.wall, simulation.cpu
                 done = Done(time_s=engine.time, steps=engine.steps, wall_s=wall, cpu_s=cpu, phases=phases)
@@ -132,6 +135,12 @@ def _costs(scene: Scene) -> tuple[PhaseCost, ...]:
 def _check_ready(scene: Scene) -> None:
     for phase in scene.phases:
         phase.ready(scene)
+
+
+def _keep_scene(scene: Scene, out: Path) -> None:
+    for name, content in filter(None, (phase.attached for phase in scene.phases)):
+        write_whole(out / name, partial(Path.write_bytes, data=content))
+    write_text(out / SCENE, dump_scene(scene, out, attached=True))
 
 
 def _check_scene(scene: Scene, out: Path) -> None:
@@ -177,25 +186,42 @@ def _of_checkpoint(out: Path) -> Iterator[None]:
         raise InputError(msg) from error
 
 
-def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None, threads: int) -> None:
+def _restore(simulation: Simulation, saved: tuple[Checkpoint, str | None] | None, start: Start) -> None:
     out, log = simulation.folder, simulation.log
     if saved is None:
         log.info("resumed from the start: no checkpoint was written")
         simulation.recorder.truncate({})
+        _note_start(out, start)
         return
     checkpoint, warning = saved
     if warning:
         simulation.warn(warning)
     with _of_checkpoint(out):
         simulation.restore(checkpoint)
-    earlier = Run(out).manifest.threads
-    if earlier != threads:
-        workers = engine_kind(simulation.scene.engine).workers
+    changes = _note_start(out, start.model_copy(update={"time_s": simulation.engine.time}))
+    if changes:
         simulation.warn(
-            f"--{workers} {threads}: the run began with {earlier}; it continues, but results may differ in their last "
-            "bits from those of a run that was never stopped"
+            f"resumed with {', '.join(changes)}; it continues, but results may differ from those of a run that was "
+            "never stopped"
         )
     log.info("resumed from the checkpoint of t = %.4f s", simulation.engine.time)
+
+
+def _note_start(out: Path, start: Start) -> list[str]:
+    """Add a start to the manifest; return what of software and threads differs from the start that it continues."""
+    manifest = Run(out).manifest
+    manifest = manifest.model_copy(update={"resumed": (*manifest.resumed, start)})
+    manifest.write(out / MANIFEST)
+    if len(manifest.makers) < 2:
+        return []
+    workers = engine_kind(manifest.engine).workers
+    then, now = (
+        {name: number for name, number in one.versions.items() if name not in HARDWARE}
+        | {f"--{workers}": str(one.threads)}
+        for one in manifest.makers[-2:]
+    )
+    names = [name for name in {**then, **now} if then.get(name) != now.get(name)]
+    return [f"{name} {now.get(name, 'unknown')} instead of {then.get(name, 'unknown')}" for name in names]
 
 
 def _mark_ended(simulation: Simulation | None, claim: Claim, log: logging.Logger, error: BaseException) -> str:
@@ -235,6 +261,7 @@ def manifest(
     """
     model, origin = scene.model, scene.phases[0].origin
     boxes = None if isinstance(model, Mixture) else model.boxes
+    start = start_of(command=command, made_by=made_by, threads=threads)
     if origin is not None:  # a relative path stays right if both runs are moved together
         origin = {**origin, "run": os.path.relpath(origin["run"], out.resolve())}
     return Manifest(
@@ -242,8 +269,8 @@ def manifest(
         scene_sha256=scene_hash(scene),
         seed=scene.seed,
         command=command,
-        started=datetime.now(UTC).isoformat(timespec="seconds"),
-        versions=versions(made_by),
+        started=start.started,
+        versions=start.versions,
         engine=scene.engine,
         threads=threads,
         fidelity=scene.fidelity.base,
@@ -270,6 +297,18 @@ def manifest(
         channel_width_m=None if scene.plane is None else scene.plane.width_m,
         kinds=None if scene.mixture is None else kinds_of(scene.mixture),
         taken_over=origin,
+        machine=start.machine,
+    )
+
+
+def start_of(*, command: str, made_by: tuple[str, str], threads: int) -> Start:
+    """Return the present start of a run; `made_by` are name and version of the engine."""
+    return Start(
+        started=datetime.now(UTC).isoformat(timespec="seconds"),
+        machine=platform.node() or None,
+        command=command,
+        threads=threads,
+        versions=versions(made_by),
     )
 
 

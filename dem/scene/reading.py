@@ -38,6 +38,8 @@ NEWER_KEYS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
             "rest_s": 0.5,
         },
         "pull-hook": {"vibration": None},
+        "lift": {"bodies": None, "nodes": None},
+        "tension": {"bodies": None},
     }
 )
 """Keys of phases that were added later, by type of phase, with their defaults; no protocol fills them in."""
@@ -193,16 +195,19 @@ def _plain(scene: Scene) -> dict[str, Any]:
     return data
 
 
-def dump_scene(scene: Scene, folder: Path | None = None) -> str:
+def dump_scene(scene: Scene, folder: Path | None = None, *, attached: bool = False) -> str:
     """Return the resolved scene as YAML, without the keys that `_plain` leaves out.
 
-    With `folder`, paths of other runs are made relative to it.
+    With `folder`, paths of runs and files are made relative to it; with `attached`, files are copies in this folder,
+    see `Phase.attached`.
     """
     data = _plain(scene)
     if folder is not None:
-        for phase in data["phases"]:
-            if "run" in phase:
-                phase["run"] = os.path.relpath(phase["run"], folder.resolve())
+        for dumped, phase in zip(data["phases"], scene.phases, strict=True):
+            for key in phase.sources & {"run", "file"}:
+                dumped[key] = os.path.relpath(dumped[key], folder.resolve())
+            if attached and phase.attached is not None:
+                dumped["file"] = phase.attached[0]
     return str(yaml.safe_dump(data, sort_keys=False, allow_unicode=True))
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from dem.phases.kinds import KINDS
 from dem.phases.phase import Phase, SceneView
+from dem.phases.place import Place
 from dem.phases.pull_hook import PullHook
 from dem.phases.remove_container import RemoveContainer
 from dem.phases.shake import check_shaking
@@ -54,7 +55,7 @@ def _of_order(scene: SceneView) -> Iterator[str]:
     begins = [phase.begins for phase in scene.phases]
     if not begins[0] or sum(begins) > 1:
         kinds = ", ".join(phase.kind for phase in scene.phases)
-        yield f"phases: got {kinds}; a run starts with one 'deposit' or one 'take-over' and has no other"
+        yield f"phases: got {kinds}; a run starts with one 'deposit', 'place' or 'take-over' and has no other"
 
 
 def _of_plane(scene: SceneView) -> Iterator[str]:
@@ -114,7 +115,7 @@ def _of_bending(scene: SceneView, engine: str) -> Iterator[str]:
         yield f"recording.contact_forces: forces at contacts of {bent}s are not recorded; leave it out"
     for index, phase in enumerate(scene.phases):
         if phase.kind == "take-over":
-            yield f"phases.{index}: take-over reads runs of rigid bodies only; pour the {bent}s by 'deposit'"
+            yield f"phases.{index}: take-over reads runs of rigid bodies only; use 'deposit', or 'place' with a frame"
 
 
 def _of_nodes(scene: SceneView) -> Iterator[str]:
@@ -171,7 +172,7 @@ def _of_container(scene: SceneView) -> Iterator[str]:
         ("radius_m", radius),
         *((f"tiers.{number}.radius_m", tier.radius_m) for number, tier in enumerate(tiers)),
     ):
-        if reach > inner:
+        if reach > inner and not isinstance(scene.phases[0], Place):  # which checks the poses themselves
             yield (
                 f"container.{key}: {inner:g} m is narrower than {body}, whose farthest point is {reach:.4g} m "
                 f"from its centre of mass; use at least {reach:.4g} m"

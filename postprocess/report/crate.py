@@ -97,7 +97,7 @@ def describe_run(directory: Path | str) -> Path:
         if one.name != LOCK and not is_partial(one.name)
     ]
     manifest = run.manifest
-    versions = dict(manifest.versions)
+    versions = manifest.made_by
     programs = _software(versions.pop("smarticles", "unknown"), versions)
     made = [one["@id"] for one in parts if one["@id"] != SCENE]
     root = {

@@ -34,7 +34,8 @@ def add(commands: Commands) -> None:
         compare_two,
         summary="compare two runs or two sweeps: scene, versions, measures and bits",
         text="""
-Prints the keys of the scene and the versions that differ, the measures of each phase, and whether series
+Prints the keys of the scene and the versions that differ (of a resumed run, those of each version and
+machine that computed a part of it), the measures of each phase, and whether series
 and frames agree bit by bit. Two sweeps are compared run by run: bits for runs with equal names, and
 means of measures for runs with equal variables. SE is the standard error of B - A.""",
         examples="""\
@@ -120,7 +121,8 @@ def compare(one: Path, other: Path) -> dict[str, Any]:
             or if one sweep has begun a run that the other has not.
         scene: values in A and in B of each key of the scene, or of each variable and constant of the sweeps, that
             differs; see `differences`.
-        versions: the same for engine, package versions and number of threads; for runs also for their status.
+        versions: the same for engine, package versions, machine and number of threads, of all that started and
+            resumed a run; for runs also for their status.
         only: for sweeps, names of the runs that A alone (key "A") and B alone (key "B") has begun; empty for runs.
         bits: result of `compare_bits` by the name of the run; one entry for two runs.
         measures: one row per phase and quantity with the values in A and B, B - A, and the standard error of B - A; for
@@ -164,7 +166,7 @@ def _kind(path: Path) -> str:
 
 def _made_by(run: Run) -> dict[str, Any]:
     manifest = run.manifest
-    return {"engine": manifest.engine, **manifest.versions, "threads": manifest.threads, "status": run.status.state}
+    return {"engine": manifest.engine, **manifest.made_by, "status": run.status.state}
 
 
 def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from dem.display import progress_of
 from dem.errors import InputError
 from dem.terminal import screen_width, warn
 from smarticles.command_line import Cell, Commands, add_options, as_json, column_blocks, names, reject_existing
-from smarticles.measuring import DONE, STATE, group_columns, grouped, measured, of_phase, sources, states
+from smarticles.measuring import DONE, STATE, group_columns, grouped, measured, of_phase, sources, states, usual_jobs
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -76,7 +76,7 @@ the run directories, so that runs which have not changed are not measured again.
     )
     profile_help = "write φ(r, z) at the end of each phase, in rings and layers of the container, as CSV"
     measure.add_argument("--profile", type=Path, metavar="FILE.csv", help=profile_help)
-    add_options(measure, "--jobs", help="number of processes; default: one per core")
+    add_options(measure, "--jobs", help="number of processes; default: one per core, fewer where memory is short")
     add_options(measure, "--overwrite", "--json")
 
 
@@ -84,7 +84,6 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     """Print the measures of runs or write them to files; return the exit status."""
     import pandas as pd  # noqa: PLC0415
 
-    from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.record.run import Run, open_run  # noqa: PLC0415
     from postprocess.measures.pile import POUR  # noqa: PLC0415
     from postprocess.measures.profile import profile_table  # noqa: PLC0415
@@ -100,7 +99,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     directories = list(sources(arguments.directories))
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
         warn(warning)
-    jobs = arguments.jobs or usable_cores()
+    jobs = arguments.jobs or usual_jobs(arguments.directories)
     with progress_of("measuring") as progress:
         table = measured(
             arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=progress

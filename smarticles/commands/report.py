@@ -67,13 +67,15 @@ def write_report(arguments: argparse.Namespace) -> int:
 
 
 def _page(directory: Path, accuracy: Path | None, jobs: int | None, phase: str | None, progress: Steps) -> str:
-    from dem.engine.cores import usable_cores  # noqa: PLC0415
+    from smarticles.measuring import usual_jobs  # noqa: PLC0415
     from smarticles.reporting.run import run_page  # noqa: PLC0415  (pandas, matplotlib, PyVista)
     from smarticles.reporting.sweep import PROVENANCE, results_page, sweep_page  # noqa: PLC0415
     from templates.sweep.folder import open_folder  # noqa: PLC0415
 
     if (directory / OF_SWEEP).is_file():
-        return sweep_page(open_folder(directory), accuracy, jobs=jobs or usable_cores(), phase=phase, progress=progress)
+        return sweep_page(
+            open_folder(directory), accuracy, jobs=jobs or usual_jobs([directory]), phase=phase, progress=progress
+        )
     if phase is not None:
         raise InputError(f"--phase {phase}: {directory} is no sweep; leave it out, the page of a run has all phases")
     if (directory / MANIFEST).is_file():

@@ -69,8 +69,9 @@ def add_resume(commands: Commands) -> None:
         text="""
 Finished runs are kept. An unfinished run continues from its last checkpoint. A run that failed, or has
 no checkpoint, starts anew; its old directory is renamed to NAME.stopped-1. With --submit slurm the runs
-that are neither finished nor in the queue become a new job, by default on the cluster of the previous
-job. To continue a study, repeat its command `smarticles study`, which also writes tables and figures.""",
+that are neither finished nor in the queue become a new job, by default on the cluster and with the
+options of the previous job, such as --time. To continue a study, repeat its command `smarticles study`,
+which also writes tables and figures.""",
         examples="""\
   smarticles resume friction
   smarticles resume friction --jobs 1

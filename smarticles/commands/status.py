@@ -48,9 +48,12 @@ which `smarticles resume` continues.""",
   smarticles status friction --watch               repeat until all runs have ended
   smarticles status friction --watch --every 60
   smarticles status friction --json | jq .counts
+  smarticles status runs/a runs/b                  several directories, one below the other
 """,
     )
-    add_options(status, "directory", help="directory of a sweep, a study or a run")
+    status.add_argument(
+        "directories", nargs="+", type=Path, metavar="DIR", help="directories of sweeps, studies or runs"
+    )
     status.add_argument(
         "--watch",
         action="store_true",
@@ -59,25 +62,28 @@ which `smarticles resume` continues.""",
     status.add_argument(
         "--every", type=positive_number, metavar="S", help="with --watch: time between two checks [s]; default: 2"
     )
-    add_options(status, "--json")
+    add_options(status, "--json", help="print JSON, for programs; of several directories, a list")
 
 
 def show_status(arguments: argparse.Namespace) -> int:
-    """Print the states of the runs in a directory, once or repeatedly; return the exit status."""
-    directory: Path = arguments.directory
+    """Print the states of the runs in directories, once or repeatedly; return the exit status."""
+    directories: list[Path] = arguments.directories
     if arguments.json and arguments.watch:
         raise InputError("--watch: cannot be combined with --json; leave it out with --json")
     if arguments.every is not None and not arguments.watch:
         raise InputError(f"--every {arguments.every:g}: sets the time between two checks of --watch; add --watch")
     if arguments.watch:
-        _watch(directory, arguments.every or _CHECK_INTERVAL_S)
-    elif arguments.json:
-        status = _read_status(directory)
-        runs = [run.to_dict() for run in status.runs]
-        content = {"name": status.name, "counts": status.counts, "queue": status.queue, "runs": runs}
-        print(as_json({"directory": str(directory), **content}))
+        _watch(directories, arguments.every or _CHECK_INTERVAL_S)
+        return 0
+    found = _read_all(directories)
+    if arguments.json:
+        contents = [
+            {"directory": str(directory), **status.to_dict()}
+            for directory, status in zip(directories, found, strict=True)
+        ]
+        print(as_json(contents if len(contents) > 1 else contents[0]))
     else:
-        print(_read_status(directory))
+        print(_text(found))
     return 0
 
 
@@ -97,12 +103,25 @@ class _Status:
         """Whether any run is running or queued."""
         return any(run.state in ("running", "queued") for run in self.runs)
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain data for JSON."""
+        runs = [run.to_dict() for run in self.runs]
+        return {"name": self.name, "counts": self.counts, "queue": self.queue, "runs": runs}
+
     def __str__(self) -> str:
         lines = [_table(self.runs)]
         if self.queue is not None and self.queue["error"]:
             lines.append(f"{self.queue['error']}; the states above come from the run directories alone")
         counts = ", ".join(f"{count} {state}" for state, count in self.counts.items())
         return "\n".join([*lines, f"{self.name}: {len(self.runs)} runs, {counts}"])
+
+
+def _read_all(directories: Sequence[Path]) -> list[_Status]:
+    return [_read_status(directory) for directory in directories]
+
+
+def _text(found: Sequence[_Status]) -> str:
+    return "\n\n".join(map(str, found))
 
 
 def _read_status(directory: Path) -> _Status:
@@ -128,8 +147,8 @@ def _read_status(directory: Path) -> _Status:
     return _Status(folder.name, runs, {**queue, "tasks": dict(sorted(states.items()))})
 
 
-def _watch(directory: Path, interval: float) -> None:
-    """Print the status every `interval` [s] until no run is active.
+def _watch(directories: Sequence[Path], interval: float) -> None:
+    """Print the status of directories every `interval` [s] until no run is active.
 
     A terminal shows the newest status in place. Other output, such as a pipe, gets a new table after each change.
     """
@@ -145,14 +164,14 @@ def _watch(directory: Path, interval: float) -> None:
         if live:
             live.start()
         while True:
-            status = _read_status(directory)
-            text = escaped(str(status))
+            found = _read_all(directories)
+            text = escaped(_text(found))
             if live:
                 live.update(Text(text), refresh=True)
             elif text != printed:
                 print(text, flush=True)
             printed = text
-            if not status.active:
+            if not any(status.active for status in found):
                 return
             time.sleep(interval)
     except KeyboardInterrupt:

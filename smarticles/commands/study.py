@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from templates.sweep.folder import Entry, Folder
     from templates.sweep.render import Value
 
+LIST = "list"  #: In place of a study's name: print the names of all studies
 _ABOUT = "\n\n".join(f"{name}: {study.about}" for name, study in registry.STUDIES.items())
 
 
@@ -31,15 +32,16 @@ def add(commands: Commands) -> None:
     study = commands.add(
         "study",
         run_study,
-        summary="compute and analyse a shipped sweep, and compare it with published results",
+        summary="compute and analyse a shipped sweep, and compare it with published results; list them",
         text=_ABOUT
         + """
 
 DIR gets the runs, and DIR/results the tables, the figures and a picture of one run. Ctrl-C stops the
 study; repeat the command to continue. `smarticles status DIR` prints the progress. --analyse analyses
-the finished runs, also while others are being computed.""",
+the finished runs, also while others are being computed. The NAME list prints all studies.""",
         examples="""\
   smarticles study gravish --quick --out gravish-quick
+  smarticles study list
   smarticles study gravish --out gravish
   smarticles study gravish --out gravish --jobs 4            use 4 cores
   smarticles study gravish --out gravish-yade --engine yade    compute every run on YADE
@@ -49,7 +51,8 @@ the finished runs, also while others are being computed.""",
   smarticles study procedures --out more --earlier results/procedures    reuse these tables
 """,
     )
-    study.add_argument("name", choices=tuple(registry.STUDIES), metavar="NAME", help=", ".join(registry.STUDIES))
+    names = (LIST, *registry.STUDIES)
+    study.add_argument("name", choices=names, metavar="NAME", help=f"{LIST}, or {', '.join(registry.STUDIES)}")
     study.add_argument("--quick", action="store_true", help="a small variant that takes minutes")
     study.add_argument(
         "--fidelity", metavar="NAME", help="replace the fidelity of the study: draft, standard or reference"
@@ -62,12 +65,17 @@ the finished runs, also while others are being computed.""",
         metavar="RESULTS",
         help="folder of results of an earlier analysis; runs of equal scenes are taken from its tables",
     )
-    add_options(study, "--out", required=True, help="directory of the study")
+    add_options(study, "--out", help="directory of the study")
     add_options(study, "--jobs")
 
 
 def run_study(arguments: argparse.Namespace) -> int:
     """Compute the missing runs of a shipped study and analyse the study; return the exit status."""
+    if arguments.name == LIST:
+        return _list(arguments)
+    if arguments.out is None:
+        msg = f"study {arguments.name}: --out DIR is missing; give a directory for its runs, tables and figures"
+        raise InputError(msg)
     from templates.sweep.expand import expand  # noqa: PLC0415
     from templates.sweep.sweep_file import load_sweep  # noqa: PLC0415
 
@@ -94,6 +102,19 @@ def run_study(arguments: argparse.Namespace) -> int:
     return compute_and_analyse(
         folder, arguments, shipped.load, note=note, full=full, pictured=pictured, earlier=earlier
     )
+
+
+def _list(arguments: argparse.Namespace) -> int:
+    """Print the names of all studies with what each is about; return the exit status."""
+    for name in ("quick", "fidelity", "engine", "analyse", "earlier", "out", "jobs"):
+        if getattr(arguments, name):
+            raise InputError(f"study {LIST}: takes no --{name}, it prints the names of the studies; leave it out")
+    rows = [
+        [name, "yes" if study.quick else "no", " ".join(study.about.split())]
+        for name, study in registry.STUDIES.items()
+    ]
+    print(columns(["study", "--quick", "about"], rows))
+    return 0
 
 
 def compute_and_analyse(

@@ -353,10 +353,11 @@ def _repeat(run: Run) -> list[Markup]:
         ["seed", str(manifest.seed)],
         ["started", manifest.started],
         ["threads", format_cell(manifest.threads)],
+        *([f"resumed at {start.time_s:.4g} s", start.started] for start in manifest.makers[1:]),
     ]
     return [
         listing("The command of this run", manifest.command),
         listing("Commands that repeat and compare the run", again),
         words(reproducible if manifest.threads == 1 else "Results on several threads differ in the last bits."),
-        provenance_table(facts, manifest.versions),
+        provenance_table(facts, manifest.made_by),
     ]

@@ -270,7 +270,7 @@ def _repeat(folder: Folder) -> list[Markup]:
     used: Counter[str] = Counter()
     for entry in folder.entries:
         try:
-            versions = Run(folder.run(entry)).manifest.versions
+            versions = Run(folder.run(entry)).manifest.made_by
         except InputError:
             continue
         used[", ".join(f"{name} {number}" for name, number in versions.items())] += 1

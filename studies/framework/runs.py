@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dem.display import Steps, silent
 from dem.errors import InputError
 from dem.plan.steps import time_steps
-from dem.record.document import Phase
+from dem.record.document import Phase, Start
 from dem.record.run import Run, open_run
 from dem.run.run import manifest
 from dem.scene.reading import load_scene
@@ -371,7 +371,9 @@ def _manifest(run: Wanted, origin: Mapping[str, Any]) -> Run:
     )
     found = Run(Path(origin["directory"]))
     # A cached property: it would be read from the directory, which does not exist.
-    vars(found)["manifest"] = made.model_copy(update={"started": origin["started"], "versions": versions})
+    resumed = tuple(Start(**start) for start in origin.get("resumed", ()))
+    known = {"started": origin["started"], "versions": versions, "machine": origin.get("machine"), "resumed": resumed}
+    vars(found)["manifest"] = made.model_copy(update=known)
     return found
 
 

@@ -6,8 +6,9 @@ import re
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import jinja2
 
@@ -35,6 +36,18 @@ class Wishes:
     runs_per_task: int | None = None
     memory_mib: int | None = None  #: Memory of a run [MiB]
     ranks: int | None = None  #: Number of processes of a run, one core each
+
+    def completed(self, earlier: Self) -> Self:
+        """Return these wishes with those of an earlier job where there is none here.
+
+        A time is for the partition that it was given with, and a number of runs for a task of one rank.
+        """
+        known = asdict(earlier)
+        if self.partition not in (None, earlier.partition):
+            del known["time"]
+        if self.ranks not in (None, earlier.ranks):
+            del known["runs_per_task"]
+        return replace(self, **{name: value for name, value in known.items() if getattr(self, name) is None})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -52,6 +52,7 @@ class Submission(Document):
     runs_per_task: int
     stored: str = ""  #: Date and time of writing
     runs: tuple[str, ...]  #: Names of the runs, in the order of the tasks
+    wishes: Wishes = Wishes()  #: Options of the user; none of them if the file lacks them
     number: str = Field("", exclude=True)  #: Name of the submission's folder in `jobs/`
 
     @property
@@ -101,9 +102,10 @@ def draft(
     submission = Submission(
         number=f"{max(taken, default=0) + 1:03d}",
         job_name=job_name(name, token or uuid.uuid4().hex[:8]),
-        cluster=str(Path(reference).resolve()) if reference.endswith(".toml") else reference,
+        cluster=resolved(reference),
         runs_per_task=request.runs_per_task,
         runs=tuple(entry.name for entry in ordered),
+        wishes=wishes,
     )
     script = render_script(
         cluster,
@@ -115,6 +117,11 @@ def draft(
         command=("smarticles",) if cluster.container else smarticles_words(),
     )
     return Draft(submission=submission, request=request, script=script, entries=ordered)
+
+
+def resolved(reference: str) -> str:
+    """Return the name of a cluster, or the absolute path of its file."""
+    return str(Path(reference).resolve()) if reference.endswith(".toml") else reference
 
 
 def write(folder: Folder, draft: Draft) -> Path:

@@ -18,7 +18,7 @@ from templates.sweep.render import Value
 from templates.sweep.sweep_file import SEED
 
 _IN_A_NAME = re.compile(r"[A-Za-z0-9._+=-]*\Z")  # what names of runs consist of
-_OF_A_FILE = re.compile(rf"contact\.{PRESET}|phases\.\d+\.run")  # keys whose value is a path
+_OF_A_FILE = re.compile(rf"contact\.{PRESET}|phases\.\d+\.(run|file)")  # keys whose value is a path
 _LONGEST_NUMBER = 8  # characters of a number in names of runs; longer ones are rounded
 
 

@@ -109,6 +109,20 @@ def test_every_output_names_its_origin(runs: list[Path], tmp_path: Path) -> None
     assert "Note: the full study as shipped" in TOY.analyse(runs[:2], tmp_path / "out", **ORIGIN).footer
 
 
+def test_a_run_that_another_version_resumed_is_not_only_of_the_first(tmp_path: Path) -> None:
+    runs = [write(tmp_path / f"good{seed}", seed=seed) for seed in (1, 2)]
+    made = json.loads((runs[0] / "run.json").read_text())
+    later = {"started": "later", "time_s": 0.2, "machine": "node7", "command": "smarticles resume good1", "threads": 1}
+    resumed = [{**later, "versions": {**made["versions"], "smarticles": "0.2.0"}}]
+    (runs[0] / "run.json").write_text(json.dumps({**made, "resumed": resumed}))
+    report = TOY.analyse(runs, tmp_path / "out", **ORIGIN)
+    versions = "Versions: smarticles 0.1.0, 0.1.0 (resumed by 0.2.0); git 0e4b151; yade 2023.02a. "
+    assert report.footer[-1].startswith(versions)
+    first, second = json.loads(report.files["provenance.json"].read_text())["runs"]
+    assert first["resumed"] == resumed
+    assert "resumed" not in second
+
+
 def test_footers_say_where_a_fidelity_is_not_the_named_one(tmp_path: Path) -> None:
     runs = [write(tmp_path / f"{rows}", seed=rows, rows=rows) for rows in (1, 2)]
     first, *_ = TOY.analyse(runs, tmp_path / "out", **ORIGIN).footer

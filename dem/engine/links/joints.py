@@ -94,6 +94,7 @@ def linkages_at(
     *,
     start: float,
     seed: int,
+    angles: Array | None = None,
 ) -> Linkages:
     """Return arrays of the linkages of `old` and of a new one.
 
@@ -101,12 +102,14 @@ def linkages_at(
         law: contact law, from which stiffness and damping of pins follow.
         start: initial angle ψ of the waves of its motors [rad].
         seed: seed of the times at which waves reverse.
+        angles: (n - 1, 3) present angles of the joints, from which commands of motors begin [rad]; None: as poured.
     """
     n = len(linkage.links)
     for row, link in zip(links.plane, linkage.links, strict=True):
         row[14:17] = link.inertia
         invert(row)
-    poured = np.array([*(joint.poured for joint in linkage.joints), np.zeros(3)])
+    present = [joint.poured for joint in linkage.joints] if angles is None else angles
+    present = np.array([*present, np.zeros(3)])
     fresh: dict[str, Any] = {
         "body": np.array([body], np.int32),
         "begin": np.array([len(old.law) + n], np.int32),
@@ -116,8 +119,8 @@ def linkages_at(
         "row": np.array([*(row_of(linkage, k, law) for k in range(n - 1)), np.zeros(joining.JOINT)]),
         "swing": swings_of(linkage, ()),
         "rest": np.array([*(rest_of(joint) for joint in linkage.joints), np.zeros(4)]),
-        "command": poured,
-        "angle": poured,
+        "command": present,
+        "angle": present,
         "torque": np.zeros((n, 3)),
         "broken": np.zeros(n, np.uint8),
         "lost": np.zeros((n, joining.LOST)),

@@ -247,9 +247,12 @@ class World:
         assert self.mixture is not None
         assert poses.kinds is not None
         rng = np.random.default_rng([self.wave_seed, self.count])
-        for shape, position, turn in zip(poses.kinds, poses.positions, turns, strict=True):
-            ends = self.mixture.kinds[shape].bars.ends
-            points = matrix_product(np.concatenate([ends[:, 0], ends[-1:, 1]]), turn.T) + position
+        for k, (shape, position, turn) in enumerate(zip(poses.kinds, poses.positions, turns, strict=True)):
+            if poses.bent is None:
+                ends = self.mixture.kinds[shape].bars.ends
+                points = matrix_product(np.concatenate([ends[:, 0], ends[-1:, 1]]), turn.T) + position
+            else:
+                points = poses.bent[k].points
             velocities = np.zeros_like(points)
             velocities[:, 2] = -speed
             start = rng.uniform(0, 2 * math.pi, 1)
@@ -292,11 +295,17 @@ class World:
             links = bodies_for(len(kind.bars.points))
             links.position[:] = matrix_product(kind.bars.ends.mean(axis=1), turn.T) + place
             links.turn[:] = [quaternion_of(own) for own in matrix_product(turn, kind.bars.frames)]
+            bent = None if poses.bent is None else poses.bent[body - first]
+            if bent is not None:
+                assert bent.turns is not None  # links have frames
+                links.position[:] = bent.points
+                links.turn[:] = [quaternion_of(own) for own in bent.turns]
             links.velocity[:, 2] = -speed
             links.shape[:] = begins[k] + np.arange(len(links.shape))
             self.linkages = linkages_at(
                 self.linkages, kind.linkage, body, links, self.contact,
                 start=float(rng.uniform(0, 2 * math.pi)), seed=self.wave_seed,
+                angles=None if bent is None else bent.angles,
             )  # fmt: skip
 
     def _lay_out_parts(self) -> None:

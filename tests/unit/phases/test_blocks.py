@@ -24,6 +24,7 @@ DT, DEPOSIT = 1e-4, {"type": "deposit"}
 AREA = math.pi * 0.0234**2
 COMPRESS = {"type": "compress", "speed_m_per_s": 0.01}
 TENSION = {"type": "tension", "grip_m": 0.005, "distance_m": 0.004, "speed_m_per_s": 0.01}
+UNGRIPPED = {key: value for key, value in TENSION.items() if key != "grip_m"}
 LIFT = {"type": "lift", "distance_m": 0.004, "speed_m_per_s": 0.01}
 REMOVE = {"type": "remove-container"}
 
@@ -279,9 +280,15 @@ def test_new_keys_at_their_defaults_change_no_hash() -> None:
         ),
         ([TENSION], {"engine": "yade"}, "phases.1 (tension): grips of rigid bodies", "engine: links"),
         ([{**TENSION, "axis": "x"}], {}, "phases.1.axis", "remove-container"),
+        ([{**TENSION, "bodies": [[0], [1]]}], {}, "phases.1.grip_m: give it, or bodies, but not both", "what is held"),
+        ([{**UNGRIPPED, "bodies": [[0], [0, 1]]}], {}, "phases.1.bodies: 0 is in both grips", "to one of them"),
+        ([{**UNGRIPPED, "bodies": [[0], [10]]}], {}, "phases.1.bodies: there is no body 10", "use 0 to 9"),
         ([TENSION], {"count": 1}, "count: 1", "at least 2"),
         ([{**TENSION, "duration_s": 0.1}], {}, "phases.1.duration_s: 0.1 s", "use at least 0.4 s"),
         ([{**LIFT, "grips": "tails"}], {}, "phases.1.grips", "use near"),
+        ([{**LIFT, "nodes": [0]}], {}, "phases.1.nodes: rigid bodies are gripped as a whole", "choose bodies"),
+        ([{**LIFT, "bodies": [10]}], {}, "phases.1.bodies: there is no body 10", "use 0 to 9"),
+        ([{**LIFT, "bodies": []}], {}, "phases.1.bodies", "at least 1"),
         ([LIFT, {"type": "shape-change"}], {}, "phases.2: shape-change", "add release before"),
         ([LIFT, COMPRESS], {}, "phases.2: the plate of compress would run into", "add release before"),
         ([{**COMPRESS, "afterwards": "stay"}, LIFT], {}, "phases.2: lift would raise", "use afterwards: remove"),

@@ -34,9 +34,18 @@ def test_what_manifests_of_older_versions_lack(run):
     assert (manifest.engine, manifest.container_tiers, manifest.planar) == ("links", 1, False)
 
 
+def test_a_manifest_of_an_older_version_describes_one_start(run):
+    edit(run, machine=None, resumed=None, versions={"smarticles": "0.1", "yade": "1"}, threads=2)
+    manifest = open_run(run).manifest
+    (start,) = manifest.starts
+    assert (start.started, start.command, start.machine) == (manifest.started, manifest.command, None)
+    assert manifest.made_by == {"smarticles": "0.1", "yade": "1", "threads": "2"}
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"resumed": [{"started": "now"}]}, "resumed.0.command: Field required"),
         ({"seed": None}, "seed: Field required;"),
         ({"solid_volume_m3": float("nan")}, "solid_volume_m3: .* finite number, got nan"),
         ({"name": 3}, "name: .* string, got 3"),

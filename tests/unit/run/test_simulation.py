@@ -28,7 +28,7 @@ from dem.run.simulation import Simulation
 from dem.run.stop import StopRequest, StopRequestedError
 from dem.scene.reading import load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
-from smarticles.commands.compare import compare_bits
+from smarticles.commands.compare import compare, compare_bits
 
 SWING = {"type": "internal-oscillation", "theta_deg": 4, "duration_s": 0.05}
 DEPOSIT, RELAX = {"type": "deposit", "per_layer": 5}, {"type": "relax", "duration_s": 0.1}
@@ -157,6 +157,79 @@ def test_another_scene_or_another_version_is_not_resumed(
         run(scene_of("rested"), tmp_path, resume=True)
     # It can still be resumed with the version that made it.
     assert json.loads((tmp_path / "failed.json").read_text())["status"] == "interrupted"
+
+
+def test_each_start_is_recorded_with_its_version_and_machine(
+    kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, out = scene_of("rested"), tmp_path / "run"
+    for number, (version, machine, threads) in enumerate(
+        # The third start continues where the second one did, which left no checkpoint.
+        [("0.2.0", "one", 1), ("0.3.0", "two", 1), ("0.4.0", "three", 2), ("0.4.0", "four", 2)]
+    ):
+        monkeypatch.setattr("dem.run.run.version", lambda _name, version=version: version)
+        monkeypatch.setattr("platform.node", lambda machine=machine: machine)
+        monkeypatch.setattr(kind, "threads", lambda threads=threads: threads)
+        if number == 1:
+            with monkeypatch.context() as killed:
+                killed.setattr(Simulation, "run", interrupt)
+                with pytest.raises(KeyboardInterrupt):
+                    run(scene, out, resume=True)
+        elif number < 3:
+            interrupted(1)
+            with pytest.raises(KeyboardInterrupt):
+                run(scene, out, resume=number > 0)
+        else:
+            interrupted(10_000)
+            run(scene, out, resume=True)
+    manifest = Run(out).manifest
+    found = [(one.versions["smarticles"], one.machine, one.threads) for one in manifest.starts]
+    assert found == [("0.2.0", "one", 1), ("0.3.0", "two", 1), ("0.4.0", "three", 2), ("0.4.0", "four", 2)]
+    assert [one.machine for one in manifest.makers] == ["one", "three", "four"]
+    first, *later = [one.time_s for one in manifest.starts]
+    assert first == 0.0 < later[0] == later[1] < later[2]
+    assert manifest.versions["smarticles"] == "0.2.0"  # the first one, as older versions wrote
+    made_by = manifest.made_by
+    assert made_by["smarticles"] == "0.2.0 (resumed by 0.4.0)"
+    assert made_by["machine"] == "one (resumed by three, four)"
+    assert made_by["threads"] == "1 (resumed by 2)"
+    assert made_by["double"] == "1"
+    lines = (out / "log.txt").read_text().splitlines()
+    by = [line.split(" INFO ")[1] for line in lines if " by smarticles " in line]
+    assert [line.split(",")[0] for line in by] == [
+        *("started by smarticles 0.2.0", "resumed by smarticles 0.3.0"),
+        *("resumed by smarticles 0.4.0", "resumed by smarticles 0.4.0"),
+    ]
+    assert "; on three, " in by[2]
+    warned = [line.split("WARNING resumed with ")[1] for line in lines if "WARNING resumed with " in line]
+    assert [line.split(";")[0] for line in warned] == [
+        "smarticles 0.3.0 instead of 0.2.0",
+        "smarticles 0.4.0 instead of 0.2.0, --threads 2 instead of 1",
+    ]
+    # `compare` shows it beside a run of one version.
+    interrupted(10_000)
+    run(scene, tmp_path / "straight")
+    versions = compare(out, tmp_path / "straight")["versions"]
+    assert versions["smarticles"] == ("0.2.0 (resumed by 0.4.0)", "0.4.0")
+    assert versions["machine"] == ("one (resumed by three, four)", "four")
+
+
+def interrupt(_simulation: Simulation) -> None:
+    raise KeyboardInterrupt
+
+
+def test_a_run_that_another_version_began_anew_is_its_own(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("dem.run.run.version", lambda _name: "0.2.0")
+    with monkeypatch.context() as killed:
+        killed.setattr(Simulation, "run", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            run(scene_of("rested"), tmp_path)
+    monkeypatch.setattr("dem.run.run.version", lambda _name: "0.3.0")
+    run(scene_of("rested"), tmp_path, resume=True)
+    assert Run(tmp_path).manifest.made_by["smarticles"] == "0.3.0"
+    assert "resumed with" not in (tmp_path / "log.txt").read_text()
 
 
 def test_a_run_asked_to_stop_does_so_at_its_next_checkpoint(

@@ -141,3 +141,16 @@ def test_one_line_says_what_filaments_on_yade_do_not_have(changes: dict[str, Any
     assert found.startswith(message)
     assert "engine: links" in found
     assert "\n" not in found
+
+
+@pytest.mark.parametrize(
+    ("nodes", "message"),
+    [
+        ({"nodes": [13]}, "phases.2.nodes: there is no 13 in a body of 13; use 0 to 12, or -1 to -13"),
+        ({"nodes": [0, -14]}, "phases.2.nodes: there is no -14 in a body of 13; use 0 to 12, or -1 to -13"),
+        ({"nodes": [0], "grips": "tails"}, "phases.2.nodes: tails are the last nodes; leave nodes or grips out"),
+    ],
+)
+def test_nodes_that_a_filament_does_not_have_are_not_gripped(nodes: dict[str, Any], message: str) -> None:
+    assert refused({"phases.2": {**LIFT, **nodes}}) == message
+    assert small({**BLOB, "phases.2": {**LIFT, "nodes": [12, -13]}})

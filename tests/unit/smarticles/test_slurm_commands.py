@@ -97,6 +97,31 @@ def test_a_sweep_is_submitted_followed_and_resumed(
     assert (out / "jobs/002/runs.txt").read_text() == "n5\n"
 
 
+def test_a_resumed_sweep_keeps_the_options_of_its_job(
+    sweep_file: Path, tmp_path: Path, smarticles: Smarticles, queue: list[str]
+) -> None:
+    out, resumed = tmp_path / "out", ("resume", tmp_path / "out", "--submit", "slurm")
+    wishes = ("--time", "00:20:00", "--partition", "debug", "--memory", "2000", "--runs-per-task", "1")
+    assert smarticles("sweep", sweep_file, "--out", out, "--submit", "slurm", *LARGE, *wishes).status == 0
+    kept = "2 tasks of 1 run: 1 cores, 2000 MiB, 00:20:00 each"
+    for words, request in (
+        ((), kept),
+        (LARGE, kept),  # the same cluster, named again
+        (("--time", "00:30:00"), "2 tasks of 1 run: 1 cores, 2000 MiB, 00:30:00 each"),
+        ((), "2 tasks of 1 run: 1 cores, 2000 MiB, 00:30:00 each"),
+    ):
+        said = smarticles(*resumed, *words)
+        assert (said.status, request in said.out) == (0, True), said
+    assert "--partition=debug" in (out / "jobs/005/array.sh").read_text()
+    # A time is for a partition, and all options are for a cluster.
+    said = smarticles(*resumed, "--partition", "shared")
+    assert "2 tasks of 1 run: 1 cores, 2000 MiB, " in said.out
+    assert "00:30:00" not in said.out
+    said = smarticles(*resumed, "--cluster", "local-slurm")
+    assert "2000 MiB" not in said.out
+    assert "--partition=debug" not in (out / "jobs/007/array.sh").read_text()
+
+
 def test_too_many_points_are_rejected_unless_wanted(sweep_file: Path, tmp_path: Path, smarticles: Smarticles) -> None:
     sweep_file.write_text(SWEEP.replace("[5, 6]", str(list(range(1, 200))).replace(" ", "")))
     sweep_file.write_text(sweep_file.read_text().replace("}}", "}}", 1) + f"repeats: {{seeds: {list(range(100))}}}\n")

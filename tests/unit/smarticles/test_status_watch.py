@@ -1,6 +1,7 @@
 """status --watch: checks again until nothing goes on."""
 
 import fcntl
+import json
 from pathlib import Path
 from typing import TextIO
 
@@ -77,3 +78,19 @@ def test_where_nothing_runs_it_checks_once(out: Path, smarticles: Smarticles) ->
     assert (said.status, "add --watch" in said.err) == (2, True)
     said = smarticles("status", out, "--watch", "--json")
     assert (said.status, "leave it out with --json" in said.err) == (2, True)
+
+
+def test_several_directories_are_shown_in_order(
+    out: Path, tmp_path: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = write_run(tmp_path / "single")
+    apart = [smarticles("status", path) for path in (run, out)]
+    said = smarticles("status", run, out)
+    assert (said.status, said.out) == (0, "\n".join(each.out for each in apart))
+    assert smarticles("status", run, out, "--watch").out == said.out
+    answers = json.loads(smarticles("status", run, out, "--json").out)
+    assert answers == [json.loads(smarticles("status", path, "--json").out) for path in (run, out)]
+    # A wrong place is known before anything is printed.
+    said = smarticles("status", run, tmp_path / "absent")
+    assert (said.status, said.out) == (2, "")
+    assert f"{tmp_path / 'absent'}: there is no such directory" in said.err

@@ -12,7 +12,7 @@ from dem.errors import RunError
 from dem.plan.steps import time_steps
 from dem.scene.scene import Scene
 from smarticles.sweeps import raise_failures
-from studies.registry import shipped
+from studies.registry import STUDIES, shipped
 from templates.local import Outcome
 from templates.sweep.folder import open_folder
 
@@ -123,6 +123,23 @@ def test_of_many_failed_runs_the_first_are_named(sweep_file: Path, tmp_path: Pat
     assert "20 of 40 runs are missing: n1: cause 1; n3: cause 3" in message
     assert f"n9: cause 9; 15 more, see smarticles status {out}; logs are in" in message
     assert "n11" not in message
+
+
+def test_studies_are_listed(tmp_path: Path, smarticles: Smarticles) -> None:
+    said = smarticles("study", "list")
+    assert said.status == 0
+    rows = {line.split()[0]: line for line in said.out.splitlines()[1:]}
+    assert rows.keys() == STUDIES.keys()
+    assert rows["gravish"].split()[1] == "yes"
+    assert rows["sensitivity"].split()[1] == "no"
+    assert rows["casting"].endswith("narrower from tier to tier.")
+    for words, message in (
+        (["gravish"], "study gravish: --out DIR is missing"),
+        (["list", "--out", tmp_path / "out"], "study list: takes no --out"),
+        (["list", "--quick"], "study list: takes no --quick"),
+    ):
+        said = smarticles("study", *words)
+        assert (said.status, message in said.err) == (2, True)
 
 
 @pytest.mark.parametrize(
