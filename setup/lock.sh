@@ -41,7 +41,7 @@ print("\n".join(names))
 PYTHON
 }
 
-wanted core viz view export calibrate >"$scratch/run.in"
+wanted core viz view export arrays calibrate >"$scratch/run.in"
 wanted docs dev >"$scratch/dev.in"
 wanted bench >"$scratch/bench.in"
 pins run setuptools -r "$scratch/run.in"
