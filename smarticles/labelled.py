@@ -35,7 +35,7 @@ def dataset_of(table: pd.DataFrame, values: Sequence[Mapping[str, Any]]) -> Any:
     try:
         xarray = import_module("xarray")  # not a dependency
     except ModuleNotFoundError as error:
-        raise InputError("to_xarray needs the package xarray; install it: pip install xarray") from error
+        raise InputError("to_xarray needs the package xarray; install it: pip install 'smarticles[arrays]'") from error
     points = pd.DataFrame([{name: _cell(value) for name, value in each.items()} for each in values])
     varied = [name for name in points if points[name].nunique(dropna=False) > 1]
     rows = points.to_dict("records")

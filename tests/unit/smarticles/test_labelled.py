@@ -76,7 +76,7 @@ def test_without_xarray_the_message_says_how_to_get_it(
     swept: smarticles.SweepDirectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(smarticles.InputError, match="pip install xarray"):
+    with pytest.raises(smarticles.InputError, match=r"pip install .smarticles\[arrays\]"):
         swept.to_xarray()
 
 
