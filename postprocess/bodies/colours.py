@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.bodies.fields import Field, checked_field, entries, link_values
+from postprocess.bodies.fields import Field, checked_field, link_values
+from postprocess.geometry.bars import entries
 from postprocess.geometry.links import Floats
 from postprocess.report import figures
 
