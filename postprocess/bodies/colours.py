@@ -79,7 +79,7 @@ class ColourScale:
         low, high = bounds
         if field.kind == "name":
             named: dict[int, list[str]] = {}
-            for value, name in (each for run in runs for each in field.names(run).items()):
+            for value, name in (each for run in runs if field.available_for(run) for each in field.names(run).items()):
                 if name not in named.setdefault(value, []):
                     named[value].append(name)
             return cls(kind="name", labels={float(value): " or ".join(named[value]) for value in sorted(named)})

@@ -68,7 +68,8 @@ def shade(axes: Axes, phases: Spans, *, named: bool = True) -> None:
     if not phases:
         return
     begin, finish = phases[0][0], phases[-1][1]
-    axes.set_xlim(begin, finish)
+    if finish > begin:
+        axes.set_xlim(begin, finish)
     figure = axes.get_figure(root=True)
     assert figure is not None
     wide, high = (_POINTS * side * _AXES for side in figure.get_size_inches())

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from scenes import small
+from synthetic import SyntheticRun, write_run
 
 from dem.body.state import RigidState
 from dem.record.frame import segment_mesh
@@ -62,6 +63,11 @@ def test_all_sizes_of_an_entry_are_one_entry(tmp_path: Path) -> None:
     assert ((found[:, 0] == 2) == (longest > 0.0155)).all()
     assert set(found[:, 0]) == {0, 1, 2, 3}
     assert entries(run_of(tmp_path / "b", STAPLE, ROD)) == [0, 1]
+
+
+def test_a_legend_leaves_out_runs_without_the_field(tmp_path: Path) -> None:
+    runs = [run_of(tmp_path / "mixed", ROD, STAPLE), Run(write_run(tmp_path / "smarticles", SyntheticRun()))]
+    assert list(ColourScale.of(BY_NAME["entry"], (0.0, 1.0), runs).labels.values()) == ["0 rod", "1 staple"]
 
 
 def test_entries_without_bodies_make_no_kinds(tmp_path: Path) -> None:
