@@ -175,7 +175,7 @@ def _mesh(path: Path, suffix: str) -> tuple[Any, NDArray[np.uint8], Whole, Whole
         vtkOutputWindow.SetInstance(window)
         vtkLogger.SetStderrVerbosity(before)
     if said.GetOutput():
-        cause = said.GetOutput().splitlines()[1].rpartition("): ")[2]
+        cause = said.GetOutput().partition("): ")[2].partition("\n")[0]  # after place and class
         cannot_read("centre lines", path, f"truncated or not VTK ({cause})", _REMEDY)
     mesh = pv.wrap(reader.GetOutput())
     if not isinstance(mesh, pv.PolyData | pv.UnstructuredGrid) or mesh.n_cells == 0:
