@@ -114,7 +114,7 @@ class Manifest(Document):
     #: Name of the engine; if the file lacks it, it follows from `versions`
     engine: str = Field(default_factory=lambda data: "links" if "links" in data["versions"] else "yade")
     threads: NonNegativeInt  #: Number of threads of the engine, or of ranks on lammps
-    fidelity: str  #: Named fidelity that gives the defaults of the scene's knobs
+    fidelity: str  #: Named fidelity that gives the defaults of the scene's parameters
     count: PositiveInt
     #: Barb length over middle length, l/w [1]; 0 for other bodies than smarticles. For these, `middle_length_m` is the
     #: length of the longest bar; mass and volume are means over bodies; thicknesses and sphere diameter are the
