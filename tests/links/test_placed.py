@@ -207,6 +207,8 @@ def test_what_hangs_bears_the_weight_below_and_the_others_fall(
     assert tops[1] < 0.045
     (measure,) = (each for each in frame_measures((), ()) if each.name == "axial force")
     assert measure.columns(frame, run)["greatest axial force [N]"] == pytest.approx(weight * below[0] / count, rel=0.01)
+    (run.path / "scene.yaml").unlink()
+    assert np.isnan(measure.columns(frame, Run(run.path))["greatest axial force [N]"])
 
 
 def test_a_run_goes_on_and_begins_anew_after_its_file_is_gone(tmp_path: Path) -> None:
