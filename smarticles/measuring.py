@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from dem.display import Steps, silent
 from dem.errors import InputError, nearest
-from dem.record.names import FRAME, OF_SWEEP, VTKHDF, collection
+from dem.record.names import OF_SWEEP
 from dem.record.sizes import aftermath
 from smarticles.kept_tables import keep, key_of, read_kept
 from smarticles.memory import free_memory
@@ -36,7 +36,9 @@ PHASE = ("phase", "phase type")  #: Columns that identify a phase within a run
 
 def has_frames(directory: Path) -> bool:
     """Return whether a run directory contains frames."""
-    return any((directory / name).is_file() for name in (collection(FRAME), VTKHDF))
+    from dem.record.run import Run  # noqa: PLC0415
+
+    return Run(directory).has_frames
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
@@ -45,20 +47,26 @@ def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
     Returns the values of the sweep's variables by run directory, empty for runs without a sweep. Runs of a sweep
     without frames are left out.
     """
-    from templates.sweep.folder import open_folder  # noqa: PLC0415
-
     found: dict[Path, Mapping[str, Any]] = {}
     for directory in directories:
-        if not (directory / OF_SWEEP).is_file():
-            found[directory] = {}
-            continue
-        folder = open_folder(directory)
-        with_frames = {run: entry.values for entry in folder.entries if has_frames(run := folder.run(entry))}
-        if not with_frames:
+        runs = _runs_in(directory)
+        if directory not in runs:  # a sweep
+            runs = {run: values for run, values in runs.items() if has_frames(run)}
+        if not runs:
             msg = f"{directory}: no run of this sweep has frames yet; start them with: smarticles resume {directory}"
             raise InputError(msg)
-        found |= with_frames
+        found |= runs
     return found
+
+
+def _runs_in(directory: Path) -> dict[Path, Mapping[str, Any]]:
+    """Return the values of the sweep's variables by run directory; a run without a sweep has none."""
+    from templates.sweep.folder import open_folder  # noqa: PLC0415
+
+    if not (directory / OF_SWEEP).is_file():
+        return {directory: {}}
+    folder = open_folder(directory)
+    return {folder.run(entry): entry.values for entry in folder.entries}
 
 
 def states(directories: Sequence[Path]) -> pd.DataFrame:
@@ -68,18 +76,13 @@ def states(directories: Sequence[Path]) -> pd.DataFrame:
     """
     import pandas as pd  # noqa: PLC0415
 
-    from templates.sweep.folder import open_folder, run_status  # noqa: PLC0415
+    from dem.record.run import Run  # noqa: PLC0415
 
     rows: list[Mapping[str, Any]] = []
     for directory in directories:
-        if (directory / OF_SWEEP).is_file():
-            folder = open_folder(directory)
-            found = {folder.run(entry): entry.values for entry in folder.entries}
-        else:
-            found = {directory: {}}
-        for run, values in found.items():
-            cells = {name: _cell(value) for name, value in values.items()}
-            rows.append({**cells, "run": str(run), STATE: run_status(run).state})
+        for run, values in _runs_in(directory).items():
+            cells = {name: as_cell(value) for name, value in values.items()}
+            rows.append({**cells, "run": str(run), STATE: Run(run).status.state})
     return pd.DataFrame(rows)
 
 
@@ -202,7 +205,7 @@ def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFr
 
     table.insert(1, STATE, Run(Path(table["run"].iloc[0])).status.state)
     for place, (name, value) in enumerate(values.items(), start=1):
-        column, cell = name, _cell(value)
+        column, cell = name, as_cell(value)
         if name in table.columns and (table[name] == cell).all():
             table = table.drop(columns=name)  # inserted again below
         elif name in table.columns:
@@ -211,7 +214,7 @@ def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFr
     return table
 
 
-def _cell(value: Any) -> Any:
+def as_cell(value: Any) -> Any:
     """Return the value of a variable as a cell of a table; mappings and lists become JSON."""
     return value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
 
