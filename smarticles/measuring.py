@@ -282,14 +282,17 @@ def group_columns(means: pd.DataFrame, by: Sequence[str]) -> list[str]:
 
 def _finished(means: pd.DataFrame, table: pd.DataFrame, by: Sequence[str], runs: pd.DataFrame | None) -> Sequence[str]:
     """Return, for each row of `means`, how many runs of its group are finished, such as "3 of 12 finished"."""
+    import pandas as pd  # noqa: PLC0415
+
     from dem.strict import equal  # noqa: PLC0415  (pydantic)
+
+    def same(one: Any, other: Any) -> bool:
+        return equal(one, other) or bool(pd.isna(one) and pd.isna(other))  # NaN: a variable of other sweeps
 
     named = [name for name in by if name not in PHASE]
     counted = runs if runs is not None and set(named) <= set(runs.columns) else table.drop_duplicates(["run", *named])
-    texts = []
+    every, texts = counted.to_dict("records"), []
     for values in means[named].to_dict("records"):
-        of_group = counted
-        for name, value in values.items():
-            of_group = of_group[[equal(one, value) for one in of_group[name]]]
-        texts.append(f"{(of_group[STATE] == DONE).sum()} of {len(of_group)} finished")
+        found = [run[STATE] for run in every if all(same(run[name], value) for name, value in values.items())]
+        texts.append(f"{found.count(DONE)} of {len(found)} finished")
     return texts
