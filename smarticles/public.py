@@ -66,6 +66,7 @@ _IN_PYTHON = (
 
 
 _WARNING = "smarticles: warning: "  # begins warnings of the command
+_MOST_VALUES = 6  # of a variable, in the text of a sweep
 _POLL_S = 0.25  # between two readings of the progress of a run
 
 
@@ -307,9 +308,9 @@ def _measures(given: Sequence[OwnMeasure]) -> list[FrameMeasure]:
     return [measure_of(one) for one in given]
 
 
-def _few(values: Sequence[Any], most: int = 6) -> str:
-    more = f", … ({len(values)})" if len(values) > most else ""
-    return f"{', '.join(map(str, values[:most]))}{more}"
+def _few(values: Sequence[Any]) -> str:
+    more = f", … ({len(values)})" if len(values) > _MOST_VALUES else ""
+    return f"{', '.join(map(str, values[:_MOST_VALUES]))}{more}"
 
 
 @overload

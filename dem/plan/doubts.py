@@ -23,7 +23,7 @@ def doubts_of(scene: Scene) -> Iterator[str]:
             large = named and named[-1] in _LARGE and (words[0] != "phases" or scene.particle is None)
             if named and (meant := _meant(angle, large=bool(large))):
                 yield f"{key}: {angle:g} means {angle:g}°, since angles are in degrees; for {angle:g} rad write {meant}"
-    if scene.plane is None and scene.container.height_m is None:
+    if scene.phases[0].pours and scene.container.height_m is None:
         radius = scene.container.radius_m
         slenderness = scene.loose_height / (2 * radius)
         if slenderness > _TALLEST:

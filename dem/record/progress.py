@@ -10,7 +10,6 @@ from dem.display import Display, Row
 from dem.errors import RunError
 from dem.record.document import Progress
 from dem.record.names import PROGRESS
-from dem.terminal import warn
 
 INTERVAL = 1.0  # s of wall time between updates
 LATE = 0.8  # share of a phase of unknown length from which on its progress slows down
@@ -107,10 +106,6 @@ class ProgressWriter:
         self._progress = self._progress.model_copy(update={"phase": phase, "end_s": end, **counts})
         self._start = start
         self._last = -math.inf
-
-    def warn(self, message: str) -> None:
-        """Print a warning to standard error."""
-        warn(message)
 
     def checkpointed(self, time: float) -> None:
         """Write the simulated time [s] of a new checkpoint without delay."""
