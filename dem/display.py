@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, redirect_stderr
+from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self, TextIO, cast
 
@@ -27,17 +27,9 @@ _BARS, _GAP = (6, 30), 2  # least and greatest width of bars, and gap between co
 _ECHO = 5  # characters that stay free: the terminal writes ^C there, and would else begin a new line
 _CELL = 100  # characters, width of the output of a notebook's cell
 
-#: A context that shows a named computation while it lasts, and yields the function to call after each part of it
-Shown = Callable[[str], AbstractContextManager[Steps]]
-
 
 def silent(_what: str, _done: int, _total: int) -> None:
     """Show nothing: the `Steps` of callers that want no progress."""
-
-
-def unseen(_label: str) -> AbstractContextManager[Steps]:
-    """Show nothing: the `Shown` of callers that want no progress."""
-    return contextlib.nullcontext(silent)
 
 
 def duration(seconds: float) -> str:

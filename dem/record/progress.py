@@ -125,8 +125,8 @@ class ProgressWriter:
         index = self._progress.index
         if self._estimate is not None and index is not None:  # the first sample comes before the first phase
             since = max(0.0, time - self._start)
-            shares = self._estimate.done(index, since), self._estimate.left_s(index, since, now)
-            self._progress = self._progress.model_copy(update=dict(zip(("fraction", "left_s"), shares, strict=True)))
+            done, left = self._estimate.done(index, since), self._estimate.left_s(index, since, now)
+            self._progress = self._progress.model_copy(update={"fraction": done, "left_s": left})
         try:
             if self.folder.is_dir():  # a folder that was removed is not made again
                 self._progress.write(self.folder / PROGRESS)
