@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from dem.display import Steps, silent
 from dem.errors import InputError, nearest
 from dem.record.names import OF_SWEEP
-from dem.record.sizes import aftermath
+from dem.record.sizes import measuring_cost
 from smarticles.kept_tables import keep, key_of, read_kept
 from smarticles.memory import free_memory
 
@@ -107,7 +108,7 @@ def _memory_of(made: Manifest) -> int:
 
     kinds, cells = made.kinds, made.kinds is None and not made.planar and made.container_tiers == 1
     bars = LINKS * made.count if kinds is None else sum(kind.bodies * kind.bars for kind in kinds)
-    return aftermath(made.count, bars, len(made.phases), cells=cells).memory_bytes
+    return measuring_cost(made.count, bars, len(made.phases), cells=cells).memory_bytes
 
 
 def values_in(folder: Folder) -> dict[str, list[Any]]:
@@ -276,7 +277,7 @@ def group_columns(means: pd.DataFrame, by: Sequence[str]) -> list[str]:
     """Return the columns of a table of `grouped` that identify a row; `state` only if a group has unfinished runs."""
     from postprocess.statistics.points import RUNS  # noqa: PLC0415
 
-    complete = STATE in by or all(len(set(text.split()[:3:2])) == 1 for text in means[STATE])
+    complete = STATE in by or all(re.fullmatch(r"(\d+) of \1 finished", text) for text in means[STATE])
     return [*by, RUNS, *([] if complete else [STATE])]
 
 
