@@ -7,10 +7,11 @@ the orientation is the smallest rotation that turns x along the bar.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import permutations
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +21,33 @@ from dem.arrays import Array, Flags, Numbers
 from dem.body.particle import LINKS
 from dem.record.document import Manifest
 
-if TYPE_CHECKING:
-    from dem.record.frame import Frame
-
 _STRAIGHT = 1e-6  # least sine of the angle between two bars that span a plane [1]
 # Added to inertia tensors, over their traces, so that equal moments have axes that do not depend on rounding.
 _TIE = 1e-6
 _EQUAL = 1e-3  # moments that differ by less, over the trace, may keep axes that are this much off
+
+
+class Recorded(Protocol):
+    """Interface of a frame: what poses are computed from, see `dem.record.frame.Frame`."""
+
+    @property
+    def count(self) -> int: ...  # noqa: D102  (as in `Frame`)
+    @property
+    def segments(self) -> Array: ...  # noqa: D102
+    @property
+    def body(self) -> Numbers: ...  # noqa: D102
+    @property
+    def link(self) -> Numbers: ...  # noqa: D102
+    @property
+    def kind(self) -> Numbers: ...  # noqa: D102
+    @property
+    def link_velocity(self) -> Array: ...  # noqa: D102
+    @property
+    def link_angular_velocity(self) -> Array: ...  # noqa: D102
+    @property
+    def cell_data(self) -> Mapping[str, NDArray[Any]]: ...  # noqa: D102
+    @property
+    def normals(self) -> Array | None: ...  # noqa: D102
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,7 +104,7 @@ class RecordedPoses:
         return np.asarray(0.5 * (moving + (self.moment_of_inertia_kg_m2 * own**2).sum(axis=1)))
 
 
-def poses_of_bars(frame: Frame, manifest: Manifest) -> RecordedPoses:
+def poses_of_bars(frame: Recorded, manifest: Manifest) -> RecordedPoses:
     """Return the poses of all bars, or links, of a frame, body by body."""
     masses, moments, flat = _inertias(frame, manifest)
     axes = _bar_axes(frame, flat, _flexible(frame, manifest))
@@ -100,7 +121,7 @@ def poses_of_bars(frame: Frame, manifest: Manifest) -> RecordedPoses:
     )
 
 
-def poses_of_bodies(frame: Frame, manifest: Manifest, bars: RecordedPoses) -> RecordedPoses:
+def poses_of_bodies(frame: Recorded, manifest: Manifest, bars: RecordedPoses) -> RecordedPoses:
     """Return the poses of all bodies of a frame, from those of its bars."""
     mass = _sums(bars.mass_kg, bars.body, frame.count)
 
@@ -135,7 +156,7 @@ def poses_of_bodies(frame: Frame, manifest: Manifest, bars: RecordedPoses) -> Re
     )
 
 
-def _flexible(frame: Frame, manifest: Manifest) -> Flags:
+def _flexible(frame: Recorded, manifest: Manifest) -> Flags:
     """Return which of the N bodies of a frame change their shape as filaments and chains do."""
     return np.array([kind.flexible for kind in manifest.kinds or ()] or [False])[frame.kind]
 
@@ -147,7 +168,7 @@ def _sums(values: Array, body: Numbers, count: int) -> Array:
     return found
 
 
-def _inertias(frame: Frame, manifest: Manifest) -> tuple[Array, Array, Flags]:
+def _inertias(frame: Recorded, manifest: Manifest) -> tuple[Array, Array, Flags]:
     """Return masses (M,) [kg] and principal moments (M, 3) [kg m²] of all bars, and which have flat sections (M,)."""
     if manifest.kinds is None:
         lengths = np.tile([manifest.barb_length_m, manifest.middle_length_m, manifest.barb_length_m], frame.count)
@@ -174,7 +195,7 @@ def _inertias(frame: Frame, manifest: Manifest) -> tuple[Array, Array, Flags]:
     return masses, moments, ~disc
 
 
-def _bar_axes(frame: Frame, flat: Flags, flexible: Flags) -> Array:
+def _bar_axes(frame: Recorded, flat: Flags, flexible: Flags) -> Array:
     """Return (M, 3, 3) axes of all bars in columns: along, across and normal.
 
     Args:
@@ -193,7 +214,7 @@ def _bar_axes(frame: Frame, flat: Flags, flexible: Flags) -> Array:
     return _axes(along, np.where(flat[:, None], frame.normals, _round_normals(frame, along, flexible)))
 
 
-def _plane_normals(frame: Frame, along: Array) -> Array:
+def _plane_normals(frame: Recorded, along: Array) -> Array:
     """Return (N, 3) normals of the planes of smarticles, from the unit vectors (N, 3, 3) along their links.
 
     Angles above 0 are on the side of y. Scenes with motors record them; for others barb 1 is on the side of y, or barb
@@ -211,7 +232,7 @@ def _plane_normals(frame: Frame, along: Array) -> Array:
     return np.where(straight, _least_turned(middle), found)
 
 
-def _round_normals(frame: Frame, along: Array, flexible: Flags) -> Array:
+def _round_normals(frame: Recorded, along: Array, flexible: Flags) -> Array:
     """Return (M, 3) normals of round bars, from unit vectors (M, 3) along them; `flexible` (N,) is of bodies.
 
     A rigid body has one normal, that of the plane of its first bar and of the first bar at a clear angle to it. A bar
