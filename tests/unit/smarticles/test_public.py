@@ -106,7 +106,7 @@ NO_MEASURES: list[tuple[dict[str, object], str]] = [
     ({"measures": min}, "measures: <built-in function min> is no list; write it in brackets"),
     ({"measures": [3]}, "measures: 3 is no function with a name; write one"),
     ({"also": "caging"}, r"also: 'caging' is one name; give a list, \['caging'\]"),
-    ({"also": ["cagin"]}, "also: 'cagin' is no measure on request; did you mean 'caging'"),
+    ({"also": ["cagin"]}, "also: there is no measure 'cagin' to add; did you mean 'caging'"),
 ]
 
 
