@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# VTK 9.7.2: a legacy file that was cut off is read without an error code, and its points are made of the missing bytes.
+# VTK 9.7.2: a legacy file that was cut off is read without an error code, with points for the bytes that are missing.
 #
 # A program that checks GetErrorCode() after Update() sees 0 for a legacy (.vtk) file that lacks half of its binary
 # points, and a mesh of the stated number of points. The reader reports the fault to VTK's output window alone: even

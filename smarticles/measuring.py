@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -90,13 +90,14 @@ def states(directories: Sequence[Path]) -> pd.DataFrame:
 def usual_jobs(directories: Sequence[Path]) -> int:
     """Return the default number of processes that measure runs and sweeps: one per core, as far as memory allows.
 
-    InputError if a sweep has no frames.
+    Directories without frames, of which there is nothing to measure, need no memory.
     """
     from dem.engine.cores import usable_cores  # noqa: PLC0415
     from dem.record.run import Run  # noqa: PLC0415
 
-    free = free_memory()
-    needed = [_memory_of(Run(directory).manifest) for directory in sources(directories)]
+    free, needed = free_memory(), list[int]()
+    with suppress(InputError):
+        needed = [_memory_of(Run(directory).manifest) for directory in sources(directories)]
     if free is None or not needed:
         return usable_cores()
     return max(1, min(usable_cores(), int(SHARE * free) // max(needed)))

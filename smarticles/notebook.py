@@ -81,7 +81,8 @@ def _particles(scene: Scene) -> Image:
         boxes = scene.body.boxes
         thicknesses = boxes.thickness_normal, boxes.thicknesses_in_plane
         return draw_smarticle(boxes.vertices, *thicknesses, size=_SIDE, title=scene.name)
-    sizes = [len(shape.factors) for shape in scene.particle]
+    shapes = {number: shape for number, shape in enumerate(scene.particle) if not shape.absent}
+    sizes = [len(shape.factors) for shape in shapes.values()]
     middles = [sum(sizes[:number]) + size // 2 for number, size in enumerate(sizes)]
     kinds = [kinds_of(scene.mixture)[place] for place in middles]
     bars = [scene.mixture.kinds[place].bars for place in middles]
@@ -95,7 +96,8 @@ def _particles(scene: Scene) -> Image:
         )
         for number, one in enumerate(bars)
     ]
-    return draw_bars(parts, kinds, size=_SIDE, title=scene.name)
+    names = [f"{number} {shape.tag()}" for number, shape in shapes.items()]
+    return draw_bars(parts, kinds, names, size=_SIDE, title=scene.name)
 
 
 def show_sweep(path: Path, runs: Sequence[Run], values: pd.DataFrame) -> str:

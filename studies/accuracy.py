@@ -1,9 +1,9 @@
 """Accuracy and cost of one scene, by variants that each change one numerical parameter (`knob` in tables).
 
-A knob has several values, its "rungs", from coarse to fine. The scene itself is the variant `base`; it is a rung of
-every knob, and is run once. Errors are relative to the reference of a knob: its finest rung with finished runs. Knobs
-of the model, such as restitution, have no accuracy but a sensitivity; their reference is the scene itself. An error
-within the scatter between seeds is not resolved, which does not prove that it is 0.
+A parameter has several values, its "rungs", from coarse to fine. The scene itself is the variant `base`; it is a rung
+of every parameter, and is run once. Errors are relative to the reference of a parameter: its finest rung with finished
+runs. Parameters of the model, such as restitution, have no accuracy but a sensitivity; their reference is the scene
+itself. An error within the scatter between seeds is not resolved, which does not prove that it is 0.
 """
 
 import argparse
@@ -42,7 +42,7 @@ from templates.sweep.sweep_file import Sweep, SweepFile
 BASE = "base"  #: Name of the variant that is the scene itself
 
 KNOBS = ("time-step", "stiffness", "section", "restitution", "control", "hinge", "fidelity", "engine")
-"""Knobs in the order of tables; `smarticles accuracy --help` explains them."""
+"""Parameters in the order of tables; `smarticles accuracy --help` explains them."""
 
 ACTUATED = frozenset({"actuate", "shape-change", "internal-oscillation"})  #: Types of phases in which barbs move
 
@@ -52,11 +52,11 @@ ACTIVITIES = ACTUATED | {"shake"}
 _OF_MOTORS = frozenset({"control", "hinge"})
 _ENGINES = ("yade", "links")
 """Engines from coarse to fine; links have smooth bodies and walls, so their converged results are the reference."""
-# Fields of the fidelity that no knob changes; a scene with its own time step is rejected.
+# Fields of the fidelity that no parameter changes; a scene with its own time step is rejected.
 _FIXED = frozenset({"wall_facets", "time_step_s"})
 _STIFFNESSES = (125.0, 250.0, 500.0, 1000.0, 2000.0, 4000.0)
 _CONVERGED = {"stiffness_N_per_m": 4000.0}
-"""Changes to the finest named fidelity on links that make the reference of the knobs `fidelity` and `engine`."""
+"""Changes to the finest named fidelity on links that make the reference of the parameters `fidelity` and `engine`."""
 AIMS = {"draft": 8.0, "standard": 3.0, "reference": 1.5}
 """Largest error [%] that each named fidelity should have on links; results/accuracy-links says which are kept."""
 _ROWS = {2: "two", 3: "three", 4: "four"}
@@ -66,10 +66,10 @@ _TEMPLATE = Path("accuracy.yaml.j2")
 
 @dataclass(frozen=True, kw_only=True)
 class Rung:
-    """One value of a knob."""
+    """One value of a parameter."""
 
     knob: str
-    value: str  #: Value of the knob, as text
+    value: str  #: Value of the parameter, as text
     unit: str  #: Unit of the value; empty for a pure number or a name
     setting: str  #: Name of the variant of the scene; its runs are named SETTING_seedN
 
@@ -80,26 +80,26 @@ class Rung:
 
     @property
     def sensitivity(self) -> bool:
-        """Whether the knob is a physical parameter of the model, whose values have effects instead of errors."""
+        """Whether the parameter is a physical one of the model, whose values have effects instead of errors."""
         return self.knob == "restitution"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ladder:
-    """Rungs (values) of all knobs (parameters), and the variants of the scene that they need."""
+    """Rungs (values) of all parameters, and the variants of the scene that they need."""
 
-    rungs: tuple[Rung, ...]  #: Rungs by knob, from coarse to fine
+    rungs: tuple[Rung, ...]  #: Rungs by parameter, from coarse to fine
     settings: Mapping[str, Mapping[str, Value]] = field(repr=False)  #: Variables of the template by variant
     left_out: tuple[str, ...] = ()  #: Rungs that the scene cannot have, with the reason, as text
     scenes: Mapping[str, Scene] = field(repr=False)  #: Scenes by variant
 
     @property
     def knobs(self) -> tuple[str, ...]:
-        """Knobs that have rungs, in the order of tables."""
+        """Parameters that have rungs, in the order of tables."""
         return tuple(dict.fromkeys(rung.knob for rung in self.rungs))
 
     def references(self) -> dict[str, Rung]:
-        """Return the reference of each knob by its name: its finest rung.
+        """Return the reference of each parameter by its name: its finest rung.
 
         The reference of a physical parameter of the model (see `Rung.sensitivity`) is the scene's own value instead.
         """
@@ -166,7 +166,7 @@ def parse_seeds(text: str) -> tuple[int, ...]:
 
 
 def parse_knobs(text: str) -> tuple[str, ...]:
-    """Parse known knobs from a text such as `time-step,section`, and return them in the order of `KNOBS`."""
+    """Parse known parameters from a text such as `time-step,section`, and return them in the order of `KNOBS`."""
     words = [word.strip() for word in text.split(",") if word.strip()]
     for word in words:
         if word not in KNOBS:
@@ -177,14 +177,14 @@ def parse_knobs(text: str) -> tuple[str, ...]:
 
 
 def build_ladder(scene: Scene, *, source: str, knobs: Sequence[str] | None = None) -> Ladder:
-    """Make the ladder of a scene: the rungs of some knobs, and the variants of the scene that they need.
+    """Make the ladder of a scene: the rungs of some parameters, and the variants of the scene that they need.
 
     Rungs that the scene cannot have, such as two rows of spheres in a square section, are left out of the ladder; it
     lists them with the reason.
 
-    `source` is the scene file, for messages. Knobs are by default all that change anything in this scene, except
-    `engine`. InputError if the scene has no activity or sets the time step in seconds, or a given knob changes nothing
-    in it.
+    `source` is the scene file, for messages. Parameters are by default all that change anything in this scene, except
+    `engine`. InputError if the scene has no activity or sets the time step in seconds, or a given parameter changes
+    nothing in it.
     """
     types = [phase.type for phase in scene.phases]
     driven = bool(ACTUATED & set(types))
@@ -276,7 +276,7 @@ def ladder_sweep(scene: Scene, ladder: Ladder, seeds: Sequence[int]) -> Sweep:
 
 
 def _template(scene: Scene) -> str:
-    """Return the text of the scene as a template, with a variable for each value that a knob changes."""
+    """Return the text of the scene as a template, with a variable for each value that a parameter changes."""
     data = scene.model_dump(mode="json")
     data |= {"name": "{{ title }}", SEED: "{{ seed }}", "engine": "{{ engine }}"}
     data["contact"]["restitution"] = "{{ restitution }}"
@@ -301,7 +301,7 @@ _Point = tuple[str, str, str, dict[str, Value]]
 
 
 def _rungs(knob: str, base: Mapping[str, Value], *, smooth: bool) -> list[_Point]:
-    """Return all rungs (values) of a knob, from coarse to fine.
+    """Return all rungs (values) of a parameter, from coarse to fine.
 
     `base` has the scene's own values; `smooth`: links are swept by spheres, and are not chains of spheres.
     """
@@ -336,7 +336,7 @@ def _names(engine: str) -> dict[str, dict[str, Value]]:
 
 
 def _sections(base: Mapping[str, Value]) -> list[_Point]:
-    """Return the rungs of the knob "section" for chains of spheres; a rung sets rows and pitch.
+    """Return the rungs of the parameter "section" for chains of spheres; a rung sets rows and pitch.
 
     Rows of spheres lie side by side in a bar. The pitch is the distance of neighbouring spheres over their diameter,
     and the diameter has its default for these rows. The scene's own rows and pitch, from `base`, are a rung as well. If
@@ -360,7 +360,7 @@ def _sections(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _strands(base: Mapping[str, Value]) -> list[_Point]:
-    """Return the rungs of the knob "section" for smooth bodies; a rung sets the number of strands.
+    """Return the rungs of the parameter "section" for smooth bodies; a rung sets the number of strands.
 
     Strands are swept spheres that lie side by side and represent a bar. The rungs are 1, 2 and 3 strands, and the
     scene's own number and diameter, from `base`, if they differ from these.
@@ -374,7 +374,7 @@ def _strands(base: Mapping[str, Value]) -> list[_Point]:
 
 
 def _shaped(name: str, shape: dict[str, Value]) -> _Point:
-    """Return a rung of the knob "section"; its name states the diameter if `shape` sets it."""
+    """Return a rung of the parameter "section"; its name states the diameter if `shape` sets it."""
     name += "" if shape["diameter_m"] is None else f" d {1e3 * shape['diameter_m']:g} mm"
     return name, "", re.sub(r"[^A-Za-z0-9.]+", "-", name), shape
 
@@ -463,13 +463,13 @@ def _of_series(run: Run, active: Sequence[int]) -> dict[str, float]:
 
 
 def work_precision(runs: pd.DataFrame, rungs: Sequence[Rung]) -> pd.DataFrame:
-    """Compare each rung with the reference of its knob.
+    """Compare each rung with the reference of its parameter.
 
-    The table has one row per rung, from coarse to fine within a knob; NaN for a rung without runs. Columns: cost and
-    means over seeds with their standard errors `… SE`; `… error [%]`, relative to the mean of the reference; `… error
-    95 % [%]`, the band of the error; `… resolved`, whether the error is beyond its band; `verdict`, whether any error
-    of the rung is resolved. The band is half of the 95 % interval by Student's t, with the scatter pooled over all
-    variants. The reference has the error 0 and the band of its own mean.
+    The table has one row per rung, from coarse to fine within a parameter; NaN for a rung without runs. Columns: cost
+    and means over seeds with their standard errors `… SE`; `… error [%]`, relative to the mean of the reference; `…
+    error 95 % [%]`, the band of the error; `… resolved`, whether the error is beyond its band; `verdict`, whether any
+    error of the rung is resolved. The band is half of the 95 % interval by Student's t, with the scatter pooled over
+    all variants. The reference has the error 0 and the band of its own mean.
     """
     groups = {rung.setting: runs[runs[VARIANT] == rung.setting] for rung in rungs}
     scatters = {name: pooled_scatter(group[column] for group in groups.values()) for name, column in COMPARED.items()}
@@ -528,7 +528,7 @@ def _errors(row: pd.Series) -> str:
 
 
 def advise(table: pd.DataFrame, knob: str) -> Outcome:
-    """Judge which rung of a knob to use: the cheapest one whose errors are not resolved.
+    """Judge which rung of a parameter to use: the cheapest one whose errors are not resolved.
 
     `table` is that of `work_precision`. The text of the outcome gives the errors of this rung and the largest error in
     φ that is possible at 95 %. For a sensitivity the text lists the rungs whose results differ from those of the scene.
@@ -651,7 +651,7 @@ def _finding(knob: str, *, sensitivity: bool) -> Finding:
 
 
 def study(rungs: Sequence[Rung], expected_s: Mapping[str, float] = MappingProxyType({})) -> Study:
-    """Make the study of a ladder, whose rungs are ordered by knob, from coarse to fine.
+    """Make the study of a ladder, whose rungs are ordered by parameter, from coarse to fine.
 
     `expected_s` has expected wall times of runs [s] by name of the run directory.
     """

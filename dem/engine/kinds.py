@@ -16,7 +16,7 @@ class EngineKind(Protocol):
     workers: str  #: Noun for parallel workers in messages: "threads", or "ranks", which are processes
     damps_once_per_update: bool
     """Whether dampers of servos use rates of the last control update, and so need an update in every step."""
-    idle_knobs: tuple[str, ...]  #: Knobs of the fidelity that have no effect on the engine
+    idle_knobs: tuple[str, ...]  #: Parameters of the fidelity that have no effect on the engine
     adds: Mapping[EffectName, Adds]  #: Additions of each effect to the engine; none for effects without an entry
 
     @property

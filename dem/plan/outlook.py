@@ -1,6 +1,6 @@
 """Plan of a run: phases, effects with reasons, engines, time steps, cost, warnings."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
@@ -177,10 +177,13 @@ def _bodies(scene: Scene) -> str:
     return f"bodies ({', '.join(names)})"
 
 
-def planned_phases(scene: Scene) -> tuple[PlannedPhase, ...]:
-    """Return the phases of a scene with their time steps and expected wall times."""
+def planned_phases(scene: Scene, steps: Sequence[float] | None = None) -> tuple[PlannedPhase, ...]:
+    """Return the phases of a scene with their time steps and expected wall times.
+
+    `steps` are the time steps of the phases [s]; None: those of the scene.
+    """
     kind, phases = engine_kind(scene.engine), []
-    for index, (phase, dt) in enumerate(zip(scene.phases, time_steps(scene), strict=True)):
+    for index, (phase, dt) in enumerate(zip(scene.phases, steps or time_steps(scene), strict=True)):
         estimate = phase.expected_duration(scene)
         wall = kind.seconds_per_second(scene, dt, scene.activity(index)) * estimate
         phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))

@@ -1,6 +1,6 @@
 """JSON files of a run directory: `run.json`, `done.json`, `failed.json` and `progress.json`."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
@@ -114,7 +114,7 @@ class Manifest(Document):
     #: Name of the engine; if the file lacks it, it follows from `versions`
     engine: str = Field(default_factory=lambda data: "links" if "links" in data["versions"] else "yade")
     threads: NonNegativeInt  #: Number of threads of the engine, or of ranks on lammps
-    fidelity: str  #: Named fidelity that gives the defaults of the scene's knobs
+    fidelity: str  #: Named fidelity that gives the defaults of the scene's parameters
     count: PositiveInt
     #: Barb length over middle length, l/w [1]; 0 for other bodies than smarticles. For these, `middle_length_m` is the
     #: length of the longest bar; mass and volume are means over bodies; thicknesses and sphere diameter are the
@@ -165,12 +165,18 @@ class Manifest(Document):
 
     @property
     def made_by(self) -> dict[str, str]:
-        """Versions by name, machine and threads of all that made the run, such as `0.2.0 (resumed by 0.3.0)`."""
-        each = [
-            {**start.versions, **({"machine": start.machine} if start.machine else {}), "threads": str(start.threads)}
-            for start in self.makers
-        ]
-        found = {}
+        """Versions by name of all that made the run, such as `0.2.0 (resumed by 0.3.0)`."""
+        return self._of_makers(lambda start: start.versions)
+
+    @property
+    def made_on(self) -> dict[str, str]:
+        """Machine and threads of all that made the run, such as `1 (resumed by 2)`."""
+        return self._of_makers(
+            lambda start: {**({"machine": start.machine} if start.machine else {}), "threads": str(start.threads)}
+        )
+
+    def _of_makers(self, facts: Callable[[Start], Mapping[str, str]]) -> dict[str, str]:
+        each, found = [facts(start) for start in self.makers], {}
         for name in dict.fromkeys(name for one in each for name in one):
             first, *others = [value for value, _ in groupby(one.get(name, "unknown") for one in each)]
             found[name] = f"{first} (resumed by {', '.join(others)})" if others else first

@@ -86,7 +86,7 @@ def run_scene(
             _keep_scene(scene, out)
         (out / FAILED).unlink(missing_ok=True)
         with log_of(out) as log:
-            bar = ProgressWriter(out, scene.count, costs=_costs(scene), display=display)
+            bar = ProgressWriter(out, scene.count, costs=_costs(scene, steps), display=display)
             simulation: Simulation | None = None
             try:
                 simulation = Simulation(
@@ -119,7 +119,7 @@ def run_scene(
                 bar.finish(remove=claim.held)
 
 
-def _costs(scene: Scene) -> tuple[PhaseCost, ...]:
+def _costs(scene: Scene, steps: Sequence[float]) -> tuple[PhaseCost, ...]:
     """Return what the phases of a scene are expected to cost."""
     return tuple(
         PhaseCost(
@@ -128,7 +128,7 @@ def _costs(scene: Scene) -> tuple[PhaseCost, ...]:
             known=planned.duration_s is not None,
             grows=phase.pours,
         )
-        for planned, phase in zip(planned_phases(scene), scene.phases, strict=True)
+        for planned, phase in zip(planned_phases(scene, steps), scene.phases, strict=True)
     )
 
 

@@ -254,7 +254,7 @@ def json_schema() -> dict[str, Any]:
     schema = Scene.model_json_schema()
     schema["required"].insert(0, "schema_version")
     del schema["properties"]["schema_version"]["default"]
-    # A file may name a fidelity, or give its base and some knobs; pydantic describes the model, which has all knobs.
+    # A file may name a fidelity, or give its base and some parameters; pydantic describes the model, which has all.
     fidelity = schema["properties"]["fidelity"]
     mapping = {"$ref": fidelity.pop("$ref")}
     fidelity["anyOf"] = [{"type": "string", "enum": list(FIDELITIES)}, mapping]

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.bodies.fields import Field, checked_field, entries, link_values
+from postprocess.bodies.fields import Field, checked_field, link_values
+from postprocess.geometry.bars import entries
 from postprocess.geometry.links import Floats
 from postprocess.report import figures
 
@@ -78,7 +79,7 @@ class ColourScale:
         low, high = bounds
         if field.kind == "name":
             named: dict[int, list[str]] = {}
-            for value, name in (each for run in runs for each in field.names(run).items()):
+            for value, name in (each for run in runs if field.available_for(run) for each in field.names(run).items()):
                 if name not in named.setdefault(value, []):
                     named[value].append(name)
             return cls(kind="name", labels={float(value): " or ".join(named[value]) for value in sorted(named)})

@@ -12,7 +12,7 @@ from dem.errors import InputError, nearest
 from dem.record.forces import read_forces
 from dem.record.frame import Frame
 from dem.record.run import Run
-from postprocess.geometry.bars import body_centres
+from postprocess.geometry.bars import body_centres, entries
 from postprocess.geometry.links import Floats, UndefinedMeasureError, link_lengths
 from postprocess.geometry.segments import segments_of
 from postprocess.geometry.voronoi import local_packing
@@ -63,19 +63,8 @@ class Field:
         return text if unit == "-" else f"{text} [{unit}]"
 
 
-def entries(run: Run) -> list[int]:
-    """Return for each of the run's kinds of bodies the entry of the scene's list `particle` it comes from.
-
-    An entry with a spread makes several kinds, one for each size; all such entries make equally many.
-    """
-    listed, count = run.scene["particle"], len(run.manifest.kinds or ())
-    spread = [bool(entry.get("spread")) for entry in listed]
-    sizes = (count - spread.count(False)) // max(spread.count(True), 1)
-    return [number for number, several in enumerate(spread) for _ in range(sizes if several else 1)]
-
-
 def _entry_names(run: Run) -> dict[int, str]:
-    return {number: f"{number} {entry['shape']}" for number, entry in enumerate(run.scene["particle"])}
+    return {number: f"{number} {run.scene['particle'][number]['shape']}" for number in entries(run)}
 
 
 def _kind_names(run: Run) -> dict[int, str]:

@@ -40,3 +40,19 @@ def segment_volumes(frame: Frame, run: Run) -> Floats:
     ]
     lengths = np.linalg.norm(frame.segments[:, 1] - frame.segments[:, 0], axis=1)
     return np.asarray(np.array(areas)[frame.kind[frame.body]] * lengths)
+
+
+def entries(run: Run) -> list[int]:
+    """Return for each of the run's kinds of bodies the entry of the scene's list `particle` it comes from.
+
+    An entry with a spread makes several kinds, one for each size; all such entries make equally many. An entry without
+    bodies, `share: 0` or `count: 0`, makes none.
+    """
+    spread = {
+        number: bool(entry.get("spread"))
+        for number, entry in enumerate(run.scene["particle"])
+        if 0 not in (entry.get("share"), entry.get("count"))
+    }
+    single = len(spread) - sum(spread.values())
+    sizes = (len(run.manifest.kinds or ()) - single) // max(len(spread) - single, 1)
+    return [number for number, several in spread.items() for _ in range(sizes if several else 1)]

@@ -13,10 +13,10 @@ from scipy.sparse.csgraph import connected_components
 from dem.errors import InputError, nearest
 from dem.record.files import cannot_read, read_csv
 from dem.record.frame import frozen
+from dem.record.poses import UNITS
 from postprocess.geometry.links import Floats, Whole
 from postprocess.geometry.segments import checked_segments
 
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6}  #: Units of length, in metres
 BODY_FIELDS = ("body", "smarticle_id")  #: Data with body numbers in VTK files; the first one found is used
 
 # Numbers of VTK's cells: lines and polylines; quadratic, cubic and Lagrange curves; cells without lines.
@@ -104,7 +104,7 @@ def _read_csv(path: Path, unit: str | None) -> tuple[Floats, Whole, Whole, NDArr
         _reject(path, f"a value is no number ({error})")
     wrong = np.nonzero(~np.isfinite(points).all(axis=1))[0]
     if len(wrong):
-        _reject(path, f"line {wrong[0] + 2} needs a whole number as body and three finite coordinates")
+        _reject(path, f"line {wrong[0] + 2} needs three finite coordinates")
     body = _whole(path, table["body"].to_numpy(), "line", np.arange(len(table)) + 2)
     order = np.argsort(body, kind="stable")
     joined = body[order][1:] == body[order][:-1]
@@ -175,7 +175,7 @@ def _mesh(path: Path, suffix: str) -> tuple[Any, NDArray[np.uint8], Whole, Whole
         vtkOutputWindow.SetInstance(window)
         vtkLogger.SetStderrVerbosity(before)
     if said.GetOutput():
-        cause = said.GetOutput().splitlines()[1].rpartition("): ")[2]
+        cause = said.GetOutput().partition("): ")[2].partition("\n")[0]  # after place and class
         cannot_read("centre lines", path, f"truncated or not VTK ({cause})", _REMEDY)
     mesh = pv.wrap(reader.GetOutput())
     if not isinstance(mesh, pv.PolyData | pv.UnstructuredGrid) or mesh.n_cells == 0:

@@ -9,8 +9,10 @@ import math
 
 import numpy as np
 
+from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.run import Run
+from postprocess.geometry.bars import entries
 from postprocess.geometry.links import Floats, UndefinedMeasureError
 from postprocess.measures.registry import FrameMeasure, Quantity, is_flexible
 
@@ -46,7 +48,8 @@ def _stiffnesses(run: Run) -> Floats:
     """Return EA [N] of the filaments of each kind, or the stiffness [N/m] of the pins of its chains (K,)."""
     kinds = run.manifest.kinds or ()
     found = []
-    for kind, shape in zip(kinds, _shapes(run), strict=True):
+    for kind, entry in zip(kinds, entries(run), strict=True):
+        shape = run.scene["particle"][entry]
         if kind.shape == "filament":
             found.append(shape["young_modulus_Pa"] * math.pi / 4 * kind.thickness_normal_m**2)
         else:
@@ -55,21 +58,11 @@ def _stiffnesses(run: Run) -> Floats:
     return np.array(found, dtype=np.float64)
 
 
-def _shapes(run: Run) -> list[dict[str, float]]:
-    """Return the scene's data of each kind; of many sizes of one shape the same ones."""
-    shapes, kinds = run.scene["particle"], run.manifest.kinds or ()
-    return list(shapes) if len(shapes) == len(kinds) else [shapes[0]] * len(kinds)
-
-
-def _available(run: Run) -> bool:
-    if not is_flexible(run):
-        return False
-    # Several shapes of which one has several sizes leave open which kind is of which shape.
-    return len(run.scene["particle"]) in (1, len(run.manifest.kinds or ()))
-
-
 def _of_frame(frame: Frame, run: Run) -> tuple[float, float]:
-    forces = axial_forces(frame, run)
+    try:
+        forces = axial_forces(frame, run)
+    except InputError:  # frames can be measured without the scene file
+        return math.nan, math.nan
     forces = forces[np.isfinite(forces)]
     return (float(forces.max()), float(forces.mean())) if len(forces) else (math.nan, math.nan)
 
@@ -80,6 +73,6 @@ MEASURES = (
         place=35,
         quantities=(Quantity("greatest axial force", "N"), Quantity("mean axial force", "N")),
         take=_of_frame,
-        available_for=_available,
+        available_for=is_flexible,
     ),
 )

@@ -4,7 +4,7 @@ The pull is the force with which other bodies, floor and wall hold back the bodi
 resting grip is their force on its bodies, in the direction in which the other grip moves; along z it includes the push
 of the floor. The strain is the elongation over the distance between the grips at the beginning, each at the mean of the
 centres of mass of its bodies. What a grip has picked up is the mass whose weight it bears, gripped bodies included; as
-a number of bodies, it is divided by the mean mass of one.
+a number of bodies, it is divided by the mean mass of one. In a mixture gripped bodies count with that mean mass.
 """
 
 from dataclasses import dataclass

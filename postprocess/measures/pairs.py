@@ -91,9 +91,10 @@ def radial_distribution(
     top = float(z.max() + beyond) if top is None else top
     outside = (across > radius) | (z < bottom) | (z > top)
     if not (0 < radius < math.inf and -math.inf < bottom < top < math.inf) or outside.any():
-        what = f"point {int(np.argmax(outside))} is outside of it" if outside.any() else "it has no volume"
+        what = f"point {int(np.argmax(outside))} is outside of it" if outside.any() else "it has no finite volume"
         raise InputError(
-            f"cylinder of radius {radius:g} m from {bottom:g} m to {top:g} m: {what}; leave radius, bottom and top out"
+            f"cylinder of radius {radius:g} m from {bottom:g} m to {top:g} m: {what}; give a radius, bottom and top "
+            "between which all points are"
         )
     i, j = _pairs(points, longest)
     pairs = _in_shells(points, i, j, edges)[1]

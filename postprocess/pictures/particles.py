@@ -28,9 +28,10 @@ def draw_smarticle(
     return _draw([mesh], [""], size=size, title=title)
 
 
-def draw_bars(bodies: Sequence[RecordedBars], kinds: Sequence[Kind], *, size: int, title: str) -> Image.Image:
-    """Draw bodies of bars, each one a kind; `RecordedBars.kind` is its place in `kinds`, `size` is in pixels."""
-    names = [f"{number} {kind.shape}" for number, kind in enumerate(kinds)]
+def draw_bars(
+    bodies: Sequence[RecordedBars], kinds: Sequence[Kind], names: Sequence[str], *, size: int, title: str
+) -> Image.Image:
+    """Draw bodies of bars with their names; `RecordedBars.kind` is a place in `kinds`, `size` is in pixels."""
     return _draw([bar_meshes(body, kinds) for body in bodies], names, size=size, title=title)
 
 

@@ -20,7 +20,7 @@ from postprocess.report.tables import reject_existing, whole_file
 FORMATS = (".png", ".pdf", ".svg")  #: Suffixes of charts
 
 _BAND = "#f0f1f2"
-_MAX__POINTS = 400
+_MOST_POINTS = 400
 _WIDTH, _HEIGHT = 4.6, 1.9  # of the chart of one series [inch]
 _POINTS, _SMALL = 72, 5.5  # points in an inch; size of the types of phases [points]
 _AXES = 0.8  # about the width and height of axes over those of the figure
@@ -67,7 +67,8 @@ def shade(axes: Axes, phases: Spans, *, named: bool = True) -> None:
     if not phases:
         return
     begin, finish = phases[0][0], phases[-1][1]
-    axes.set_xlim(begin, finish)
+    if finish > begin:
+        axes.set_xlim(begin, finish)
     figure = axes.get_figure(root=True)
     assert figure is not None
     wide, high = (_POINTS * side * _AXES for side in figure.get_size_inches())
@@ -94,9 +95,9 @@ def thinned(times: Array, values: Array) -> tuple[Array, Array]:
     """
     finite = np.isfinite(values)
     times, values = times[finite], values[finite]
-    if len(times) <= _MAX__POINTS:
+    if len(times) <= _MOST_POINTS:
         return times, values
-    intervals = np.array_split(np.arange(len(times)), _MAX__POINTS // 2)
+    intervals = np.array_split(np.arange(len(times)), _MOST_POINTS // 2)
     kept = np.unique([index for s in intervals for index in (s[values[s].argmin()], s[values[s].argmax()])])
     return times[kept], values[kept]
 

@@ -166,7 +166,7 @@ def _kind(path: Path) -> str:
 
 def _made_by(run: Run) -> dict[str, Any]:
     manifest = run.manifest
-    return {"engine": manifest.engine, **manifest.made_by, "status": run.status.state}
+    return {"engine": manifest.engine, **manifest.made_by, **manifest.made_on, "status": run.status.state}
 
 
 def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:

@@ -29,7 +29,6 @@ from postprocess.measures.registry import Shown, shown_quantities
 from postprocess.measures.table import LAST_FRAMES
 from postprocess.report.series import spans_of
 from postprocess.statistics.points import RUNS, counted, format_with_error, marked
-from smarticles.command_line import format_cell
 from smarticles.measuring import has_frames, measured
 from smarticles.reporting.charts import against_time
 from smarticles.reporting.page import data_url, embedded, figure, listing, page, table, turntable, words
@@ -352,7 +351,7 @@ def _repeat(run: Run) -> list[Markup]:
         ["scene hash (SHA-256)", manifest.scene_sha256],
         ["seed", str(manifest.seed)],
         ["started", manifest.started],
-        ["threads", format_cell(manifest.threads)],
+        *(list(fact) for fact in manifest.made_on.items()),
         *([f"resumed at {start.time_s:.4g} s", start.started] for start in manifest.makers[1:]),
     ]
     return [

@@ -110,8 +110,8 @@ def _options(folder: Folder, study: Script, quick: bool) -> str:
         for name in ("engine", "fidelity")
         if isinstance(made.get(name), str) and made[name] != shipped.get(name)
     ]
-    words = [study.name, *(["--quick"] if quick else []), *changed]
-    return " ".join([*words, "--out", shlex.quote(folder.path.resolve().name)])
+    variant = ["--quick"] if quick else []
+    return " ".join([study.name, *variant, *changed, "--out", shlex.quote(folder.path.resolve().name)])
 
 
 def results_page(folder: Path) -> str:

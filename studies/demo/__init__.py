@@ -1,1 +1,1 @@
-"""The runs of `make demo`, and what is said of them."""
+"""Draw and describe the runs of `make demo`."""

@@ -178,19 +178,13 @@ class Origin:
                     "directory": str(one.run.path),
                     **{name: getattr(one.run.manifest, name) for name in of_run},
                     "versions": dict(one.run.manifest.versions),
-                    **_resumed(one.run),
+                    **one.run.manifest.model_dump(mode="json", include={"machine", "resumed"}, exclude_defaults=True),
                 }
                 for one in self.found.runs
             ],
             "missing": [asdict(run) for run in self.found.missing],
         }
         return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
-
-
-def _resumed(run: Run) -> dict[str, object]:
-    """Return the later starts of a run, each with its versions and machine; nothing if the run was never resumed."""
-    later = [start.model_dump(mode="json", exclude_none=True) for start in run.manifest.resumed]
-    return {"resumed": later} if later else {}
 
 
 def make_folder(path: Path | str) -> Path:

@@ -119,7 +119,7 @@ class Study:
             note: how the runs differ from the full study, for footers.
             full: what the full study found, for footers; empty if these runs are the full study.
             earlier: runs of an earlier analysis by name, which replace directories that do not exist.
-            progress: function that is called after each run that is measured.
+            progress: function that is called before each run is measured.
         """
         output = make_folder(output)
         found = collect_runs(self.name, run_dirs, self.measured, earlier=earlier, progress=progress)

@@ -14,11 +14,14 @@ import pytest
 from numpy.typing import NDArray
 from pages import DOCS, REPOSITORY, RUN, SHOWN, WRITTEN, Block, Page, pages
 from PIL import Image
+from terminals import Terminal
 
 from smarticles.main import build_parser
 
 PAGES = {page.name: page for page in pages()}
 FOLLOWED = [name for name, page in PAGES.items() if any(block.language in RUN for block in page.blocks)]
+TYPED = {"README.md": (80, 24), "docs/tutorial.md": (200, 50)}
+"""Pages whose commands are typed into terminals of these columns and rows."""
 COLOURS = 128
 """Colours of a committed picture: half the size of all of them, and no visible difference."""
 
@@ -44,10 +47,24 @@ def _do(page: Page, block: Block, folder: Path, words: dict[str, str]) -> None:
     command = ["bash", "-euo", "pipefail", "-c", block.text]
     if block.language == "python":
         command = [sys.executable, "-W", "error", "-c", block.text]
+    if page.name in TYPED:
+        _type(page, block, command, folder, words)
+        return
     done = subprocess.run(command, cwd=folder, env=words, capture_output=True, text=True, check=False, timeout=900)
     said = f"{page.name}:{block.line} exit status {done.returncode}\n{block.text}\n{done.stdout[-2000:]}\n{done.stderr}"
     assert done.returncode == 0, said
     assert "Traceback" not in done.stderr, said
+
+
+def _type(page: Page, block: Block, command: list[str], folder: Path, words: dict[str, str]) -> None:
+    """Run a block in a terminal, where a person meets bars, tables that fit, and colours."""
+    columns, rows = TYPED[page.name]
+    with Terminal(command, folder=folder, columns=columns, rows=rows, environment=words) as terminal:
+        status = terminal.end(900)
+        said = "\n".join([f"{page.name}:{block.line} exit status {status}", block.text, *terminal.history])
+    assert status == 0, said
+    assert not re.search("Traceback|internal error", terminal.raw), said
+    assert not any("━" in line for line in terminal.lines), said  # no bar is left behind
 
 
 @pytest.mark.parametrize("name", FOLLOWED)

@@ -24,6 +24,7 @@ SCENE: dict[str, Any] = {
     ],
     "recording": {"frame_interval_s": 0.02, "checkpoint_interval_s": 0.04, "energy": True},
 }
+SETTLED = 0.02  # m/s, speed below which the pour of this scene counts as settled, see `smarticles plan`
 Notes = dict[float, dict[str, Any]]
 
 
@@ -72,7 +73,11 @@ def test_measures_agree_with_the_engine(handed: tuple[Path, Notes]) -> None:
         assert row["contacts mean [-]"] == note["contacts"].mean()
         assert row["kinetic energy [J]"] == note["state"].kinetic_energy
         phi = series["packing_fraction"][series.nearest(row["time [s]"])]
-        assert row["phi second-highest-com [-]"] == pytest.approx(phi, rel=near)
+        speeds = np.linalg.norm(note["state"].velocities, axis=1)
+        if row["phase type"] == "deposit" and (len(speeds) < SCENE["count"] or speeds.max() > SETTLED):
+            assert np.isnan(row["phi second-highest-com [-]"])
+        else:
+            assert row["phi second-highest-com [-]"] == pytest.approx(phi, rel=near)
     summary = summarise_run(Run(out), costly="never")
     assert summary["phase type"].tolist() == [phase["type"] for phase in SCENE["phases"]]
     assert summary["phi second-highest-com [-]"].gt(0).all()

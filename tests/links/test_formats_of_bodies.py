@@ -23,7 +23,7 @@ from dem.run.run import manifest
 from dem.scene.reading import dump_scene
 from postprocess.measures.caging import cages
 from postprocess.measures.contacts import strands_of
-from postprocess.trajectory import capsules_of, orientations, shapes_of, write_trajectory
+from postprocess.trajectory import capsules_of, motion_of, shapes_of, write_trajectory
 from smarticles.commands.compare import compare_bits
 
 SHAPES: dict[str, dict[str, Any]] = {
@@ -105,7 +105,7 @@ def test_capsules_are_the_strands_of_the_engine(name: str, fidelity: str, tmp_pa
         apart = np.minimum(*(np.abs(found.ends - each).max(axis=(1, 2)) for each in (ends, ends[::-1])))
         assert apart.min() < 1e-9
     assert found.radii == pytest.approx(kind.radius)
-    quaternions = orientations(found.ends[:, 1] - found.ends[:, 0])
+    quaternions = motion_of(found, run.frames[0]).orientation
     vertices = np.array([shapes_of(found)[k]["vertices"] for k in found.type_of])
     turned = np.einsum("pij,pkj->pki", Rotation.from_quat(quaternions, scalar_first=True).as_matrix(), vertices)
     placed = turned + found.ends.mean(axis=1, keepdims=True)
@@ -138,6 +138,7 @@ def test_a_trajectory_has_the_shapes_of_kinds_that_are_poured_later(tmp_path: Pa
         vertices=last.vertices[:1],
         smarticle_ids=last.smarticle_ids[:1],
         link_velocity=last.link_velocity[bars],
+        link_angular_velocity=last.link_angular_velocity[bars],
         bars=alone,
     )
     assert len(set(last.kind)) == 2

@@ -115,7 +115,7 @@ def test_a_body_of_any_shape_begins_where_the_file_says(particle: Any, points: A
 def test_motors_hold_where_they_were_put_and_turn_back_at_their_speed(tmp_path: Path) -> None:
     still = {"gravity_m_per_s2": 0, "particle": ARM}
     made = scene(tmp_path, [zigzag(8, 0.004, angle=0.4)], {"type": "relax", "duration_s": 0.1}, **still)
-    run_scene(made, tmp_path / "run", command="", progress=False)
+    run_scene(made, tmp_path / "run", command="")
     run = Run(tmp_path / "run")
     edges = run.frames[len(run.frames) - 1].segments
     along = (edges[:, 1] - edges[:, 0]) / 0.004
@@ -164,7 +164,7 @@ def hung(folder: Path, left: int, right: int, friction: float) -> Run:
         contact=contact,
         fidelity={"base": "draft", "stiffness_N_per_m": 10},
     )
-    run_scene(made, folder / "run", command="", progress=False)
+    run_scene(made, folder / "run", command="")
     return Run(folder / "run")
 
 
@@ -190,7 +190,7 @@ def test_what_hangs_bears_the_weight_below_and_the_others_fall(
 ) -> None:
     bodies = [straight(count, step), straight(count, step, x=0.005)]
     made = scene(tmp_path, bodies, HOLD, particle=particle)
-    run_scene(made, tmp_path / "run", command="", progress=False)
+    run_scene(made, tmp_path / "run", command="")
     run = Run(tmp_path / "run")
     frame = run.frames[len(run.frames) - 1]
     weight = made.model.mass * G
@@ -207,11 +207,13 @@ def test_what_hangs_bears_the_weight_below_and_the_others_fall(
     assert tops[1] < 0.045
     (measure,) = (each for each in frame_measures((), ()) if each.name == "axial force")
     assert measure.columns(frame, run)["greatest axial force [N]"] == pytest.approx(weight * below[0] / count, rel=0.01)
+    (run.path / "scene.yaml").unlink()
+    assert np.isnan(measure.columns(frame, Run(run.path))["greatest axial force [N]"])
 
 
 def test_a_run_goes_on_and_begins_anew_after_its_file_is_gone(tmp_path: Path) -> None:
     made = scene(tmp_path, [straight(12, 0.0025)], HOLD, particle=WORM)
-    run_scene(made, tmp_path / "whole", command="", progress=False)
+    run_scene(made, tmp_path / "whole", command="")
     (tmp_path / "poses.csv").unlink()
     whole = Run(tmp_path / "whole")
     assert_goes_on(load_scene(whole.path / "scene.yaml"), whole, tmp_path / "stopped", 0.1)
@@ -219,7 +221,7 @@ def test_a_run_goes_on_and_begins_anew_after_its_file_is_gone(tmp_path: Path) ->
 
 def test_a_frame_of_filaments_is_a_start(tmp_path: Path) -> None:
     made = scene(tmp_path, [straight(12, 0.0025), straight(12, 0.0025, x=0.006)], HOLD, particle=WORM)
-    run_scene(made, tmp_path / "run", command="", progress=False)
+    run_scene(made, tmp_path / "run", command="")
     frame = Run(tmp_path / "run").frames[6]
     again = scene(tmp_path, [], count=2, particle=WORM, **{"phases.0.file": str(frame.path.relative_to(tmp_path))})
     engine = build_engine(again, 1e-6)
@@ -233,7 +235,7 @@ def test_rigid_bodies_are_gripped_by_number(tmp_path: Path) -> None:
     rods = [straight(1, 0.01, x=x) for x in (-0.005, 0.0, 0.005)]
     lift = {"type": "lift", "bodies": [2, 0], "distance_m": 0.001, "speed_m_per_s": 0.02, "duration_s": 0.1}
     particle = {"shape": "rod", "length_m": 0.01, "diameter_m": 1e-3}
-    run_scene(scene(tmp_path, rods, lift, particle=particle), tmp_path / "run", command="", progress=False)
+    run_scene(scene(tmp_path, rods, lift, particle=particle), tmp_path / "run", command="")
     run = Run(tmp_path / "run")
     frame = run.frames[len(run.frames) - 1]
     np.testing.assert_allclose(frame.segments[[0, 2], 0, 2], 0.051, atol=1e-6)
@@ -251,7 +253,7 @@ def test_two_bodies_hooked_into_each_other_are_pulled_apart_by_number(tmp_path: 
     third = [(x + 0.012, y, z - 0.015) for x, y, z in up]
     pull = {"type": "tension", "bodies": [[1], [0]], "distance_m": 0.003, "speed_m_per_s": 0.05}
     made = scene(tmp_path, [up, down, third], pull, particle=staple)
-    run_scene(made, tmp_path / "run", command="", progress=False)
+    run_scene(made, tmp_path / "run", command="")
     series = Run(tmp_path / "run").series
     held = np.flatnonzero(np.isfinite(series["elongation_m"]))
     assert (series["grip_fixed_count"][held] == 1).all()

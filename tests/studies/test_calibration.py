@@ -11,8 +11,11 @@ import pytest
 from scipy import stats
 
 from dem.errors import InputError, RunError
+from dem.scene.reading import load_scene
+from smarticles.starters import __file__ as starters
 from studies.calibration import emulator, inference, report
 from studies.calibration.inference import Array, Result, calibrate
+from studies.calibration.measures import columns_of_scene
 from studies.calibration.problem import Datum, Problem, load_problem
 from studies.calibration.simulators import FunctionSimulator, TableSimulator, read_runs
 
@@ -373,3 +376,8 @@ def test_ranks_reveal_intervals_that_are_too_narrow(tmp_path: Path) -> None:
 def test_labels_name_measure_and_condition() -> None:
     datum = Datum(condition=0, measure="phi_0", value=1.0, error=0.1, fitted=True)
     assert (datum.label([{"l_over_w": 0.4}]), datum.label([{}])) == ("phi_0 (l_over_w 0.4)", "phi_0")
+
+
+@pytest.mark.parametrize("name", ["worms", "snakes"])
+def test_columns_of_bodies_that_bend_are_known_before_a_run(name: str) -> None:
+    assert "greatest axial force [N]" in columns_of_scene(load_scene(Path(starters).parent / f"{name}.yaml"), 0)

@@ -119,8 +119,8 @@ class Terminal:
             time.sleep(0.05)
         return lines
 
-    def end(self) -> int:
+    def end(self, patience_s: float = PATIENCE_S) -> int:
         """Wait until the process has ended, and return its exit status."""
-        status = self.process.wait(PATIENCE_S)
+        status = self.process.wait(patience_s)
         self._reader.join(10)
         return status

@@ -29,7 +29,9 @@ def share(lines: list[str]) -> float:
 @pytest.mark.parametrize(("columns", "rows"), [(80, 24), (200, 50)])
 def test_the_bar_moves_and_leaves_nothing_behind(columns: int, rows: int, type_command: Type) -> None:
     out = f"runs/{columns}"
-    with type_command("run", "scene.yaml", "--out", out, "--set", "count=300", columns=columns, rows=rows) as terminal:
+    with type_command(
+        "run", "scene.yaml", "--out", out, "--set", "phases.1.duration_s=20", columns=columns, rows=rows
+    ) as terminal:
         first = terminal.wait_for(lambda lines: share(lines) >= 0)
         began = time.monotonic()
         left = re.search(r"(\d+):(\d\d) left", bar(first))

@@ -39,7 +39,8 @@ def test_a_manifest_of_an_older_version_describes_one_start(run):
     manifest = open_run(run).manifest
     (start,) = manifest.starts
     assert (start.started, start.command, start.machine) == (manifest.started, manifest.command, None)
-    assert manifest.made_by == {"smarticles": "0.1", "yade": "1", "threads": "2"}
+    assert manifest.made_by == {"smarticles": "0.1", "yade": "1"}
+    assert manifest.made_on == {"threads": "2"}
 
 
 @pytest.mark.parametrize(

@@ -117,6 +117,7 @@ def test_a_scene_is_its_keys_and_its_bodies(tmp_path: Path) -> None:
     assert len(blue) > 1000
     assert len(orange) > 1000
     assert blue.max() < orange.min()
+    assert colours(picture(scene_of(particle=[{**ROD, "spread": 0.2, "share": 0}, STAPLE]))) > 1000
 
 
 @pytest.mark.parametrize("shape", [

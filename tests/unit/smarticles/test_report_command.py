@@ -104,6 +104,7 @@ def test_the_page_of_a_run_has_everything(run: Path, smarticles: Smarticles) -> 
     assert "This scene changes rows, which the table does not cover." in page.text
     assert page.row("warning: two hooks") == ["warning: two hooks", "3 ×"]
     assert page.row("seed")[1] == "1"
+    assert [row[0] for row in page.rows if row and "threads" in row[0]] == ["threads"]  # no version of a package
     assert "smarticles run pile/scene.yaml --out pile-again" in page.text
     assert str(run.parent) not in (run / "report.html").read_text(encoding="utf-8")
     assert len(page.of("img")) >= 3

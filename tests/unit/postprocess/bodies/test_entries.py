@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from scenes import small
+from synthetic import SyntheticRun, write_run
 
 from dem.body.state import RigidState
 from dem.record.frame import segment_mesh
@@ -17,7 +18,8 @@ from dem.record.run import Run
 from dem.run.run import manifest
 from dem.scene.reading import dump_scene
 from postprocess.bodies.colours import ColourScale, Paint, colour_field, scalars
-from postprocess.bodies.fields import BY_NAME, entries, link_values
+from postprocess.bodies.fields import BY_NAME, link_values
+from postprocess.geometry.bars import entries
 from postprocess.pictures.canvas import Canvas
 from postprocess.pictures.render import render_run
 from postprocess.view import RunView
@@ -61,6 +63,19 @@ def test_all_sizes_of_an_entry_are_one_entry(tmp_path: Path) -> None:
     assert ((found[:, 0] == 2) == (longest > 0.0155)).all()
     assert set(found[:, 0]) == {0, 1, 2, 3}
     assert entries(run_of(tmp_path / "b", STAPLE, ROD)) == [0, 1]
+
+
+def test_a_legend_leaves_out_runs_without_the_field(tmp_path: Path) -> None:
+    runs = [run_of(tmp_path / "mixed", ROD, STAPLE), Run(write_run(tmp_path / "smarticles", SyntheticRun()))]
+    assert list(ColourScale.of(BY_NAME["entry"], (0.0, 1.0), runs).labels.values()) == ["0 rod", "1 staple"]
+
+
+def test_entries_without_bodies_make_no_kinds(tmp_path: Path) -> None:
+    run = run_of(tmp_path / "a", ROD | {"share": 0}, STAPLE | {"share": 1}, ROD | {"share": 1, "spread": 0.1})
+    assert entries(run) == [1] + [2] * 16
+    assert dict(BY_NAME["entry"].names(run)) == {1: "1 staple", 2: "2 rod"}
+    alone = run_of(tmp_path / "b", ROD | {"share": 0}, STAPLE | {"share": 1})
+    assert colour_field(None, alone).name == "contacts"
 
 
 def test_mixtures_are_coloured_by_entry_and_one_entry_by_contacts(tmp_path: Path) -> None:

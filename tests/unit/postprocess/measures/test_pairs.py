@@ -57,8 +57,9 @@ def test_a_cubic_lattice_has_its_neighbours_at_their_distances():
 @pytest.mark.parametrize(
     ("keywords", "words"),
     [
-        ({"radius": 0.5}, ["point", "outside", "leave radius"]),
+        ({"radius": 0.5}, ["point", "outside", "give a radius"]),
         ({"top": -1.0}, ["outside"]),
+        ({"top": np.inf}, ["no finite volume", "give a radius"]),
         ({"longest": 0.0}, ["longest distance", "0.0 m"]),
         ({"bins": 0}, ["0 bins"]),
     ],

@@ -46,6 +46,14 @@ def test_a_series_is_drawn_with_its_unit_over_its_phases(pile: Path) -> None:
     assert spans_of(smarticles.read(pile))[1] == (1.0, 1.5, "relax")
 
 
+def test_a_run_of_one_sample_has_a_chart(tmp_path: Path) -> None:
+    unfinished = SyntheticRun(phases=("deposit",), frames_per_phase=1, status="unfinished")
+    directory = write_run(tmp_path / "a", unfinished)
+    write_series(directory, {"time_s": np.array([0.1]), "phase": np.array([0]), "com_height_m": np.ones(1)}, seed=1)
+    (axes,) = smarticles.plot(directory, "com_height_m").axes
+    assert [text.get_text() for text in axes.texts] == ["deposit"]
+
+
 def test_a_gap_is_no_line_and_a_vector_has_a_curve_for_each_component(pile: Path) -> None:
     chart = smarticles.plot(pile, ["plate_z_m", "plate_force_N", "packing_fraction"])
     plate, force, packing = chart.axes
