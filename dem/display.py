@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, redirect_stderr
+from contextlib import contextmanager, redirect_stderr
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self, TextIO, cast
 
@@ -17,7 +17,7 @@ from dem.terminal import bare, escaped, folded, spelling
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
 
-#: A function that is told what is being done, and how much of it: `progress("runs measured", 3, 12)`
+#: A function that shows what is done, and how much of it: `progress("runs measured", 3, 12)`
 Steps = Callable[[str, int, int], None]
 
 INTERVAL_S = 30.0  # between two lines where there is no terminal
@@ -28,17 +28,8 @@ _ECHO = 5  # characters that stay free: the terminal writes ^C there, and would 
 _CELL = 100  # characters, width of the output of a notebook's cell
 
 
-#: A context that shows a named computation while it lasts, and yields the function to call after each part of it
-Shown = Callable[[str], AbstractContextManager[Steps]]
-
-
 def silent(_what: str, _done: int, _total: int) -> None:
     """Show nothing: the `Steps` of callers that want no progress."""
-
-
-def unseen(_label: str) -> AbstractContextManager[Steps]:
-    """Show nothing: the `Shown` of callers that want no progress."""
-    return contextlib.nullcontext(silent)
 
 
 def duration(seconds: float) -> str:
@@ -122,10 +113,12 @@ class Display:
                 redirect_stdout=False,  # they would obey control characters
                 redirect_stderr=False,
             )
-            self._live.start()
+            self._stack.enter_context(self._live)
             self._stack.enter_context(redirect_stderr(cast(TextIO, _Above(self.print))))
         else:
-            threading.Thread(target=self._write_lines, daemon=True).start()
+            writer = threading.Thread(target=self._write_lines, daemon=True)
+            writer.start()
+            self._stack.callback(writer.join)  # no line may follow what is printed next
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -133,8 +126,6 @@ class Display:
         self._ended.set()
         # A terminal that was closed must not hide why the computation ended.
         with contextlib.suppress(OSError):
-            if self._live is not None:
-                self._live.stop()
             self._stack.close()
         if self._cell is not None:
             self._update_cell("")

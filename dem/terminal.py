@@ -15,6 +15,7 @@ from typing import Any, TextIO, cast
 _OBEYED = [*range(9), *range(11, 32), *range(127, 160), 0x2028, 0x2029, *range(0x202A, 0x202F), *range(0x2066, 0x206A)]
 _ESCAPES = {code: f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}" for code in _OBEYED}
 
+_LONGEST_LINE = 100  # characters of running text, which is hard to read in wider lines
 _SPELLED = "smarticles.spelled"  # name of the handler of characters that an encoding lacks
 _SPELLINGS = {
     **{"⟨": "<", "⟩": ">", "…": "...", "±": "+-", "×": "x", "·": "*", "−": "-", "–": "-", "°": " deg", "∞": "inf"},
@@ -83,10 +84,19 @@ class Printable:
         return getattr(self.stream, name)
 
 
+def say(text: str) -> None:
+    """Print text to standard output, in lines that fit a terminal."""
+    print(folded(text, width=screen_width()), flush=True)
+
+
+def complain(text: str) -> None:
+    """Print a message of the program to standard error, in lines that fit a terminal."""
+    print(folded(f"smarticles: {text}", width=screen_width(sys.stderr), at="; "), file=sys.stderr)
+
+
 def warn(text: str) -> None:
     """Print a warning to standard error."""
-    line = f"smarticles: warning: {text}"
-    print(folded(line, width=screen_width(sys.stderr), at="; "), file=sys.stderr)
+    complain(f"warning: {text}")
 
 
 def bare(stream: TextIO) -> TextIO:
@@ -101,6 +111,11 @@ def printable() -> Iterator[None]:
         out, error = (cast(TextIO, Printable(stream)) for stream in (sys.stdout, sys.stderr))
         with redirect_stdout(out), redirect_stderr(error):
             yield
+
+
+def text_width() -> int:
+    """Return the length of lines of running text on standard output."""
+    return min(screen_width() or _LONGEST_LINE, _LONGEST_LINE)
 
 
 def screen_width(stream: TextIO | None = None) -> int | None:

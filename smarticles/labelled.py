@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from dem.errors import InputError
-from smarticles.measuring import follows
+from smarticles.measuring import as_cell, follows
 
 _TEXTS = ("run", "state")  # columns that describe a run
 
@@ -36,7 +35,7 @@ def dataset_of(table: pd.DataFrame, values: Sequence[Mapping[str, Any]]) -> Any:
         xarray = import_module("xarray")  # not a dependency
     except ModuleNotFoundError as error:
         raise InputError("to_xarray needs the package xarray; install it: pip install 'smarticles[arrays]'") from error
-    points = pd.DataFrame([{name: _cell(value) for name, value in each.items()} for each in values])
+    points = pd.DataFrame([{name: as_cell(value) for name, value in each.items()} for each in values])
     varied = [name for name in points if points[name].nunique(dropna=False) > 1]
     rows = points.to_dict("records")
     leading = [name for place, name in enumerate(varied) if not _led(name, varied[:place], varied[place + 1 :], rows)]
@@ -55,11 +54,6 @@ def dataset_of(table: pd.DataFrame, values: Sequence[Mapping[str, Any]]) -> Any:
         found = found.assign_coords({name: (leader, known.reindex(found[leader].values).to_numpy())})
     texts = [name for name in _TEXTS if name in table.columns and name not in leading]
     return found.assign_coords(xarray.Dataset.from_dataframe(table[texts].set_axis(index)).data_vars)
-
-
-def _cell(value: Any) -> Any:
-    """Return the value of a variable as the cell of a table: a list or a mapping as text."""
-    return value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
 
 
 def _led(name: str, before: Sequence[str], after: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> bool:

@@ -16,7 +16,7 @@ from typing import Any
 
 from dem.errors import InputError, RunError
 from dem.run.stop import release
-from dem.terminal import folded, printable, screen_width
+from dem.terminal import complain, printable
 from smarticles.command_line import Commands, Parser, add_options
 from smarticles.commands import (
     accuracy,
@@ -181,8 +181,7 @@ def _explain(error: Exception) -> tuple[str, int]:
 def _complain(text: str, error: BaseException, debug: bool) -> None:
     # A terminal that was closed cannot show the text.
     with suppress(OSError):
-        line = f"smarticles: {' '.join(text.split())}"
-        print(folded(line, width=screen_width(sys.stderr), at="; "), file=sys.stderr)
+        complain(" ".join(text.split()))
         if debug:
             traceback.print_exception(error)
 

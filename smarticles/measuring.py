@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import nullcontext, suppress
@@ -13,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 from dem.display import Steps, silent
 from dem.errors import InputError, nearest
-from dem.record.names import FRAME, OF_SWEEP, VTKHDF, collection
-from dem.record.sizes import aftermath
+from dem.record.names import OF_SWEEP
+from dem.record.sizes import measuring_cost
 from smarticles.kept_tables import keep, key_of, read_kept
 from smarticles.memory import free_memory
 
@@ -36,7 +37,9 @@ PHASE = ("phase", "phase type")  #: Columns that identify a phase within a run
 
 def has_frames(directory: Path) -> bool:
     """Return whether a run directory contains frames."""
-    return any((directory / name).is_file() for name in (collection(FRAME), VTKHDF))
+    from dem.record.run import Run  # noqa: PLC0415
+
+    return Run(directory).has_frames
 
 
 def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
@@ -45,20 +48,26 @@ def sources(directories: Sequence[Path]) -> dict[Path, Mapping[str, Any]]:
     Returns the values of the sweep's variables by run directory, empty for runs without a sweep. Runs of a sweep
     without frames are left out.
     """
-    from templates.sweep.folder import open_folder  # noqa: PLC0415
-
     found: dict[Path, Mapping[str, Any]] = {}
     for directory in directories:
-        if not (directory / OF_SWEEP).is_file():
-            found[directory] = {}
-            continue
-        folder = open_folder(directory)
-        with_frames = {run: entry.values for entry in folder.entries if has_frames(run := folder.run(entry))}
-        if not with_frames:
+        runs = _runs_in(directory)
+        if directory not in runs:  # a sweep
+            runs = {run: values for run, values in runs.items() if has_frames(run)}
+        if not runs:
             msg = f"{directory}: no run of this sweep has frames yet; start them with: smarticles resume {directory}"
             raise InputError(msg)
-        found |= with_frames
+        found |= runs
     return found
+
+
+def _runs_in(directory: Path) -> dict[Path, Mapping[str, Any]]:
+    """Return the values of the sweep's variables by run directory; a run without a sweep has none."""
+    from templates.sweep.folder import open_folder  # noqa: PLC0415
+
+    if not (directory / OF_SWEEP).is_file():
+        return {directory: {}}
+    folder = open_folder(directory)
+    return {folder.run(entry): entry.values for entry in folder.entries}
 
 
 def states(directories: Sequence[Path]) -> pd.DataFrame:
@@ -68,18 +77,13 @@ def states(directories: Sequence[Path]) -> pd.DataFrame:
     """
     import pandas as pd  # noqa: PLC0415
 
-    from templates.sweep.folder import open_folder, run_status  # noqa: PLC0415
+    from dem.record.run import Run  # noqa: PLC0415
 
     rows: list[Mapping[str, Any]] = []
     for directory in directories:
-        if (directory / OF_SWEEP).is_file():
-            folder = open_folder(directory)
-            found = {folder.run(entry): entry.values for entry in folder.entries}
-        else:
-            found = {directory: {}}
-        for run, values in found.items():
-            cells = {name: _cell(value) for name, value in values.items()}
-            rows.append({**cells, "run": str(run), STATE: run_status(run).state})
+        for run, values in _runs_in(directory).items():
+            cells = {name: as_cell(value) for name, value in values.items()}
+            rows.append({**cells, "run": str(run), STATE: Run(run).status.state})
     return pd.DataFrame(rows)
 
 
@@ -105,7 +109,7 @@ def _memory_of(made: Manifest) -> int:
 
     kinds, cells = made.kinds, made.kinds is None and not made.planar and made.container_tiers == 1
     bars = LINKS * made.count if kinds is None else sum(kind.bodies * kind.bars for kind in kinds)
-    return aftermath(made.count, bars, len(made.phases), cells=cells).memory_bytes
+    return measuring_cost(made.count, bars, len(made.phases), cells=cells).memory_bytes
 
 
 def values_in(folder: Folder) -> dict[str, list[Any]]:
@@ -203,7 +207,7 @@ def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFr
 
     table.insert(1, STATE, Run(Path(table["run"].iloc[0])).status.state)
     for place, (name, value) in enumerate(values.items(), start=1):
-        column, cell = name, _cell(value)
+        column, cell = name, as_cell(value)
         if name in table.columns and (table[name] == cell).all():
             table = table.drop(columns=name)  # inserted again below
         elif name in table.columns:
@@ -212,7 +216,7 @@ def _with_variables(table: pd.DataFrame, values: Mapping[str, Any]) -> pd.DataFr
     return table
 
 
-def _cell(value: Any) -> Any:
+def as_cell(value: Any) -> Any:
     """Return the value of a variable as a cell of a table; mappings and lists become JSON."""
     return value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
 
@@ -274,20 +278,23 @@ def group_columns(means: pd.DataFrame, by: Sequence[str]) -> list[str]:
     """Return the columns of a table of `grouped` that identify a row; `state` only if a group has unfinished runs."""
     from postprocess.statistics.points import RUNS  # noqa: PLC0415
 
-    complete = STATE in by or all(len(set(text.split()[:3:2])) == 1 for text in means[STATE])
+    complete = STATE in by or all(re.fullmatch(r"(\d+) of \1 finished", text) for text in means[STATE])
     return [*by, RUNS, *([] if complete else [STATE])]
 
 
 def _finished(means: pd.DataFrame, table: pd.DataFrame, by: Sequence[str], runs: pd.DataFrame | None) -> Sequence[str]:
     """Return, for each row of `means`, how many runs of its group are finished, such as "3 of 12 finished"."""
+    import pandas as pd  # noqa: PLC0415
+
     from dem.strict import equal  # noqa: PLC0415  (pydantic)
+
+    def same(one: Any, other: Any) -> bool:
+        return equal(one, other) or bool(pd.isna(one) and pd.isna(other))  # NaN: a variable of other sweeps
 
     named = [name for name in by if name not in PHASE]
     counted = runs if runs is not None and set(named) <= set(runs.columns) else table.drop_duplicates(["run", *named])
-    texts = []
+    every, texts = counted.to_dict("records"), []
     for values in means[named].to_dict("records"):
-        of_group = counted
-        for name, value in values.items():
-            of_group = of_group[[equal(one, value) for one in of_group[name]]]
-        texts.append(f"{(of_group[STATE] == DONE).sum()} of {len(of_group)} finished")
+        found = [run[STATE] for run in every if all(same(run[name], value) for name, value in values.items())]
+        texts.append(f"{found.count(DONE)} of {len(found)} finished")
     return texts

@@ -12,7 +12,7 @@ _FILES = {
 
 
 def free_memory(*, proc: Path = Path("/proc"), groups: Path = Path("/sys/fs/cgroup")) -> int | None:
-    """Return the memory that can still be used [bytes]; None where the system does not tell.
+    """Return the memory that can still be used [bytes]; None where the system does not report it.
 
     `proc` and `groups` are where Linux shows processes and groups of processes (cgroups, either version).
     """

@@ -106,6 +106,6 @@ def show_sweep(path: Path, runs: Sequence[Run], values: pd.DataFrame) -> str:
     shown = values.assign(state=states)
     head = f"{path}: {states.count('done')} of {len(runs)} runs are done"
     table = f"<div><p>{escape(head)}</p>{shown.to_html(max_rows=_MOST_ROWS, border=0)}</div>"
-    drawn = [run for run in runs if any(run.path.glob("frames.*"))]
+    drawn = [run for run in runs if run.has_frames]
     places = sorted({round(place) for place in np.linspace(0, len(drawn) - 1, min(_MOST_RUNS, len(drawn)))})
     return beside(table, _png(lambda: _piles([drawn[place] for place in places])) if drawn else None)

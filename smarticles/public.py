@@ -36,7 +36,7 @@ from smarticles.main import BAD_INPUT
 from smarticles.measuring import grouped, measured, of_phase, states, values_in
 from smarticles.notebook import show_sweep
 from smarticles.sweeps import compute, make_folder, raise_failures
-from templates.local import environment, smarticles_command
+from templates.local import cause_of, environment, smarticles_command
 from templates.sweep.folder import Folder, open_folder
 from templates.sweep.from_scene import variables, varied_template
 from templates.sweep.sweep_file import SEED
@@ -66,6 +66,7 @@ _IN_PYTHON = (
 
 
 _WARNING = "smarticles: warning: "  # begins warnings of the command
+_MOST_VALUES = 6  # of a variable, in the text of a sweep
 _POLL_S = 0.25  # between two readings of the progress of a run
 
 
@@ -211,19 +212,17 @@ def run(
         if isinstance(scene, Scene):
             # The file in the temporary folder will not exist; `scene.yaml` in the run directory will.
             words += ["--recorded-as", shlex.join(["smarticles", "run", str(Path(out) / SCENE), "--out", "NEW"])]
-        with Path(scratch, "said").open("w+", encoding="utf-8") as said:
+        with Path(scratch, "said").open("w+", encoding="utf-8", errors="replace") as said:
             # In a session of its own: Ctrl-C reaches this process alone, which signals the run once.
             process = subprocess.Popen(
                 words, env=environment(), stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
             )
             status = _wait(process, Path(out), progress=progress)
             said.seek(0)
-            lines = [line for line in said.read().splitlines() if line.startswith("smarticles: ")]
+            output = said.read()
         if status:
-            lines = lines or [f"exit status {status}, without a message"]
-            text = lines[-1].removeprefix("smarticles: ").removeprefix("error: ")
-            raise InputError(text) if status == BAD_INPUT else RunError(text)
-    for line in lines:
+            raise (InputError if status == BAD_INPUT else RunError)(cause_of(output, status))
+    for line in output.splitlines():
         if line.startswith(_WARNING):
             warnings.warn(line.removeprefix(_WARNING), stacklevel=2)
     return Run(Path(out))
@@ -309,9 +308,9 @@ def _measures(given: Sequence[OwnMeasure]) -> list[FrameMeasure]:
     return [measure_of(one) for one in given]
 
 
-def _few(values: Sequence[Any], most: int = 6) -> str:
-    more = f", … ({len(values)})" if len(values) > most else ""
-    return f"{', '.join(map(str, values[:most]))}{more}"
+def _few(values: Sequence[Any]) -> str:
+    more = f", … ({len(values)})" if len(values) > _MOST_VALUES else ""
+    return f"{', '.join(map(str, values[:_MOST_VALUES]))}{more}"
 
 
 @overload

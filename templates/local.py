@@ -300,13 +300,17 @@ def time_left(
 
 
 def _cause(log: Path, returncode: int) -> str:
-    """Return why a process that wrote no `failed.json` ended: its error, else exit status and last line."""
+    """Return why a process that wrote no `failed.json` ended."""
     try:
-        lines = [
-            line.strip() for line in log.read_text(encoding="utf-8", errors="replace").splitlines() if line.strip()
-        ]
+        output = log.read_text(encoding="utf-8", errors="replace")
     except OSError:
-        lines = []
+        output = ""
+    return cause_of(output, returncode) + ("" if output.strip() else f"; see {log}")
+
+
+def cause_of(output: str, returncode: int) -> str:
+    """Return why the process of a run ended: the error in its output, else exit status and last line."""
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
     for line in lines:
         if line.startswith("smarticles: error: "):
             return line.removeprefix("smarticles: error: ")
@@ -314,4 +318,4 @@ def _cause(log: Path, returncode: int) -> str:
     if returncode < 0:
         name = signal.Signals(-returncode).name
         reason = f"killed by {name}" + (" (out of memory?)" if name == "SIGKILL" else "")
-    return f"{reason}: {lines[-1]}" if lines else f"{reason}, without output; see {log}"
+    return f"{reason}: {lines[-1]}" if lines else f"{reason}, without output"

@@ -142,7 +142,8 @@ def fitted(shape: Array, points: Array) -> tuple[Array, Array, Array]:
 
 def _turns(moments: Array) -> Array:
     """Return (N, 3, 3) rotations R that make trace(Rᵀ M) largest, for `moments` M (N, 3, 3)."""
-    m = moments / np.abs(moments).max(axis=(1, 2), keepdims=True)
+    largest = np.abs(moments).max(axis=(1, 2), keepdims=True)
+    m = moments / np.where(largest > 0, largest, 1)  # zero: all points are in one place
     n = np.empty((len(m), 4, 4))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3

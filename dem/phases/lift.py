@@ -13,7 +13,7 @@ from dem.engine.interface import Engine, Filaments, Grips
 from dem.phases.compress import Compress, check_plate_is_gone
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
 from dem.phases.travel import reject_early_end, travel_time, travel_to_text
-from dem.setting.part import LONGEST_LENGTH, Duration, Length, Part, Speed, reject_wrong_unit
+from dem.setting.part import LONGEST_LENGTH, BodyNumbers, Duration, Length, Part, Speed, reject_wrong_unit
 
 
 class Lift(Part, Phase):
@@ -41,7 +41,7 @@ class Lift(Part, Phase):
         description="least height of gripped nodes or bodies above the floor [m]; default: near, the mean height of "
         "the centres of mass; tails, or with bodies or nodes, 0",
     )
-    bodies: Annotated[tuple[Annotated[int, Field(ge=0, lt=100_000)], ...], Field(min_length=1)] | None = Field(
+    bodies: BodyNumbers | None = Field(
         None,
         description="numbers, from 0, of the bodies that may be gripped, in the order in which they were added; "
         "default: all",

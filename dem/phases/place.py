@@ -1,7 +1,6 @@
 """The phase that puts bodies at poses from a file."""
 
 import hashlib
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,7 +8,7 @@ from pathlib import Path
 from typing import ClassVar, Literal, Self, cast
 
 import numpy as np
-from pydantic import Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, model_validator
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
@@ -20,11 +19,11 @@ from dem.body.placement import Poses
 from dem.body.posing import Pose, posed
 from dem.body.state import FilamentState, LinkageState, PileState, RigidState, State, spheres_of
 from dem.engine.interface import Engine
-from dem.errors import InputError, shown
+from dem.errors import InputError
 from dem.phases.phase import Memory, Phase, SceneView, Stage
 from dem.record.poses import POSES, PosedBody, read_poses
 from dem.setting.hooks import Cross
-from dem.setting.part import Part
+from dem.setting.part import Part, ScenePath, Sha256
 
 MOST_OVERLAP = 0.05  # in diameters; contacts of piles at rest are less deep
 NEXT = 3  # bars of a body that bends, from which on they may touch each other, if they are longer than thick
@@ -37,35 +36,19 @@ class Place(Part, Phase):
     needs_links: ClassVar[str] = "start poses from a file"
     sources: ClassVar[frozenset[str]] = frozenset({"file"})
     type: Literal["place"]
-    file: str = Field(
+    file: ScenePath = Field(
         ...,
-        min_length=1,
         description="CSV file with columns body, x, y, z: points of the centre lines of all bodies, heights from the "
         "floor; or a .vtu, such as a frame of a run. Relative to the scene file; the run directory keeps a copy",
     )
     unit: Literal["m", "cm", "mm", "um"] | None = Field(
         None, description="unit of the coordinates; default: that in the header, x [mm], and m for frames of runs"
     )
-    sha256: str | None = Field(
+    sha256: Sha256 | None = Field(
         None,
         description="SHA-256 of the file; default: filled in when the scene is read, so that later changes of the file "
         "are noticed. It counts for the scene's hash; the name of the file does not",
     )
-
-    @field_validator("file")
-    @classmethod
-    def _seen_from_the_scene(cls, value: str, info: ValidationInfo) -> str:
-        if not value.isprintable():
-            raise ValueError(f"{shown(value)} has characters that cannot be printed; give the path of a file")
-        folder = (info.context or {}).get("folder") or Path()
-        return str((Path(folder) / value).resolve())
-
-    @field_validator("sha256")
-    @classmethod
-    def _a_hash(cls, value: str | None) -> str | None:
-        if value is not None and not re.fullmatch("[0-9a-f]{64}", value):
-            raise ValueError(f"{shown(value)} is no SHA-256 of 64 digits; leave it out, it is filled in")
-        return value
 
     @model_validator(mode="wrap")
     @classmethod
@@ -95,28 +78,30 @@ class Place(Part, Phase):
 
     @cached_property
     def _bodies(self) -> tuple[PosedBody, ...]:
-        """Bodies of the file; InputError if it is missing, damaged or changed."""
-        _ = self.attached
-        return read_poses(Path(self.file), unit=self.unit)
+        """Bodies of the file; InputError, which begins with a key, if it is damaged."""
+        try:
+            return read_poses(Path(self.file), unit=self.unit)
+        except InputError as error:
+            raise InputError(f"file: {error}") from None
 
     def check(self, scene: SceneView, index: int) -> Iterator[str]:
-        if not Path(self.file).exists():
-            return  # a scene without its file can still be read; `ready` rejects it before a run
-        try:
-            poses = self._poses(scene)
-        except InputError as error:
-            yield f"phases.{index}.{error}"
-            return
-        yield from _misplaced(scene, poses, self._bodies)
+        # A scene without its file can still be read; `ready` rejects it before a run.
+        if Path(self.file).exists():
+            yield from self._problems(scene)
 
     def ready(self, scene: SceneView) -> None:
+        for problem in self._problems(scene):
+            raise InputError(problem)
+
+    def _problems(self, scene: SceneView) -> Iterator[str]:
+        """Yield what is wrong with the file, and with the places of its bodies in a scene."""
         try:
             _ = self.attached  # the file may have changed since the scene was read
             poses = self._poses(scene)
         except InputError as error:
-            raise InputError(f"phases.0.{error}") from None
-        for problem in _misplaced(scene, poses, self._bodies):
-            raise InputError(problem)
+            yield f"phases.0.{error}"
+            return
+        yield from _misplaced(scene, poses, self._bodies)
 
     def first_memory(self, scene: SceneView) -> Memory:
         return {"put": False}
@@ -132,10 +117,7 @@ class Place(Part, Phase):
 
     def _poses(self, scene: SceneView) -> Poses:
         """Return the poses of a scene's bodies; InputError, which begins with a key, if they do not fit the file."""
-        try:
-            found, file = self._bodies, Path(self.file).name
-        except InputError as error:
-            raise InputError(f"file: {error}") from None
+        found, file = self._bodies, Path(self.file).name
         if len(found) != scene.count:
             raise InputError(f"file: {file} has {len(found)} bodies, but count is {scene.count}; make them equal")
         kinds = _kinds(scene, found, file)
@@ -251,10 +233,8 @@ class _Spheres:
         if not len(one):
             return
         apart = np.linalg.norm(self.places[one] - self.places[other], axis=1)
-        depths, allowed = (
-            self.radii[one] + self.radii[other] - apart,
-            np.minimum(self.allowed[one], self.allowed[other]),
-        )
+        depths = self.radii[one] + self.radii[other] - apart
+        allowed = np.minimum(self.allowed[one], self.allowed[other])
         worst = int((depths - allowed).argmax())
         if depths[worst] > allowed[worst]:
             first, second = (self.names[self.body[ends[worst]]] for ends in (one, other))

@@ -7,7 +7,6 @@ chain, smooth links do not. Such overlaps are reduced first, by steps in which v
 
 import hashlib
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +14,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 import numpy as np
-from pydantic import Field, ModelWrapValidatorHandler, ValidationInfo, field_validator, model_validator
+from pydantic import Field, ModelWrapValidatorHandler, field_validator, model_validator
 
 from dem.arrays import Array, Flags
 from dem.body.placement import Poses, fitted_poses
@@ -25,7 +24,7 @@ from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Settle, S
 from dem.record.frame import Frame
 from dem.record.run import Run, open_run
 from dem.setting.hooks import Cross
-from dem.setting.part import Part
+from dem.setting.part import Part, ScenePath, Sha256
 
 LAST = "last"  # the frame at the end of a run that is done
 TAKEN_SECONDS = 0.05  # s, typical time in which a pile that was taken over comes to rest
@@ -101,39 +100,24 @@ class TakeOver(Part, Phase):
     at_rest: ClassVar[bool] = True
     sources: ClassVar[frozenset[str]] = frozenset({"run", "frame"})
     type: Literal["take-over"]
-    run: str = Field(..., min_length=1, description="directory of the run, relative to the scene file")
+    run: ScenePath = Field(..., description="directory of the run, relative to the scene file")
     frame: Annotated[int, Field(ge=0, le=10**9)] | Literal["last"] = Field(
         "last",
         description="number of the frame, as in the name of its file; last: the last frame of a run that is done, "
         "whose number is filled in when the scene is read",
     )
-    sha256: str | None = Field(
+    sha256: Sha256 | None = Field(
         None,
         description="SHA-256 of the frame's vertices above the floor; default: filled in when the scene is read, so "
         "that later changes of the frame are noticed. It counts for the scene's hash; run and frame do not",
     )
     settle: Settle = Field(default_factory=Settle, description="when the pile counts as settled")
 
-    @field_validator("run")
-    @classmethod
-    def _seen_from_the_scene(cls, value: str, info: ValidationInfo) -> str:
-        if not value.isprintable():
-            raise ValueError(f"{shown(value)} has characters that cannot be printed; give the path of a run directory")
-        folder = (info.context or {}).get("folder") or Path()
-        return str((Path(folder) / value).resolve())
-
     @field_validator("frame", mode="before")
     @classmethod
     def _number_or_last(cls, value: Any) -> Any:
         if value != LAST and (not isinstance(value, int) or isinstance(value, bool) or value < 0):
             raise ValueError(f"{shown(value)} is no frame; use its number, from 0, or {LAST}")
-        return value
-
-    @field_validator("sha256")
-    @classmethod
-    def _a_hash(cls, value: str | None) -> str | None:
-        if value is not None and not re.fullmatch("[0-9a-f]{64}", value):
-            raise ValueError(f"{shown(value)} is no SHA-256 of 64 digits; leave it out, it is filled in")
         return value
 
     @model_validator(mode="wrap")

@@ -1,7 +1,7 @@
 """The phase that pulls the pile apart between two grips."""
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -20,10 +20,9 @@ from dem.phases.travel import (
     travel_time,
     travel_to_text,
 )
-from dem.setting.part import Duration, Force, Length, Part, Speed
+from dem.setting.part import BodyNumbers, Duration, Force, Length, Part, Speed
 from dem.setting.vibration import Vibration
 
-Held = Annotated[tuple[Annotated[int, Field(ge=0, lt=100_000)], ...], Field(min_length=1)]
 MOVED = 1  # number of the grip that moves; the grip at rest is 0, since all others are released before
 
 
@@ -44,7 +43,7 @@ class Tension(Part, Phase):
         description="distance along the axis from the outermost centre of mass within which bodies are held [m]; "
         "needed unless bodies are given",
     )
-    bodies: tuple[Held, Held] | None = Field(
+    bodies: tuple[BodyNumbers, BodyNumbers] | None = Field(
         None,
         description="numbers, from 0, of the bodies that the grip at rest holds, and of those that the moving grip "
         "holds; default: by grip_m",

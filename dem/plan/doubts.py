@@ -15,15 +15,8 @@ _TALLEST = 4.5  # heights of poured piles over their width [1]; those of the shi
 
 def doubts_of(scene: Scene) -> Iterator[str]:
     """Yield a warning for each value of a scene that is probably a mistake: key, value, what to do."""
-    for key, value in flattened(scene.given).items():
-        words = key.split(".")
-        named = [word for word in words if word.endswith("_deg")]
-        for angle in value if isinstance(value, list) else [value]:
-            # Joints of chains and filaments bend by few degrees.
-            large = named and named[-1] in _LARGE and (words[0] != "phases" or scene.particle is None)
-            if named and (meant := _meant(angle, large=bool(large))):
-                yield f"{key}: {angle:g} means {angle:g}°, since angles are in degrees; for {angle:g} rad write {meant}"
-    if scene.plane is None and scene.container.height_m is None:
+    yield from _of_angles(scene)
+    if scene.phases[0].pours and scene.container.height_m is None:
         radius = scene.container.radius_m
         slenderness = scene.loose_height / (2 * radius)
         if slenderness > _TALLEST:
@@ -35,6 +28,19 @@ def doubts_of(scene: Scene) -> Iterator[str]:
             )
 
 
+def _of_angles(scene: Scene) -> Iterator[str]:
+    for key, value in flattened(scene.given).items():
+        words = key.split(".")
+        name = next((word for word in reversed(words) if word.endswith("_deg")), None)
+        if name is None:
+            continue
+        # Joints of chains and filaments bend by few degrees.
+        large = name in _LARGE and (words[0] != "phases" or scene.particle is None)
+        for angle in value if isinstance(value, list) else [value]:
+            if meant := _meant(angle, large=large):
+                yield f"{key}: {angle:g} means {angle:g}°, since angles are in degrees; for {angle:g} rad write {meant}"
+
+
 def _meant(angle: Any, *, large: bool) -> str:
     """Return the angle in degrees that was probably meant by a number in radians; "" if degrees were meant.
 
@@ -44,6 +50,7 @@ def _meant(angle: Any, *, large: bool) -> str:
         return ""
     degrees = math.degrees(angle)
     rounded = _ROUND * round(degrees / _ROUND)
-    if abs(degrees - rounded) <= _NEAR and (angle % 0.5 or large):
+    in_halves = angle % 0.5 == 0  # as degrees are usually given
+    if abs(degrees - rounded) <= _NEAR and (large or not in_halves):
         return f"{rounded:g}"
     return f"{degrees:.3g}" if large and abs(angle) <= math.pi else ""

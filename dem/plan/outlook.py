@@ -10,7 +10,7 @@ from dem.engine.kinds import engine_kind
 from dem.plan.doubts import doubts_of
 from dem.plan.effects import Decision, decide
 from dem.plan.steps import stable_step, time_steps
-from dem.record.sizes import MIB, Aftermath, aftermath
+from dem.record.sizes import MIB, MeasuringCost, measuring_cost
 from dem.scene.scene import Scene
 from dem.scene.stiffness import expected_overlaps, too_soft
 from dem.setting.fidelity import Fidelity
@@ -53,7 +53,7 @@ class Plan:
     effects: tuple[Decision, ...]
     engines: tuple[str, ...]
     frames: int
-    after: Aftermath  #: What measures of the run will take
+    measuring: MeasuringCost
     wall_s: float  #: Expected wall time of all phases, without `start_s` and `compile_s`
     warnings: tuple[str, ...]
     planar: bool = False
@@ -111,18 +111,18 @@ class Plan:
         for effect in self.effects:
             lines.append(f"{effect.name:<20}{'on' if effect.on else 'off':<5}{effect.why}")
             lines += [f"{'':<25}+ {added}"] if (added := effect.adds.to_text()) else []
-        lines += ["", "engines: " + ", ".join(self.engines), *self._after_to_text()]
+        lines += ["", "engines: " + ", ".join(self.engines), *self._measuring_to_text()]
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
 
-    def _after_to_text(self) -> list[str]:
+    def _measuring_to_text(self) -> list[str]:
         """Return lines about the frames, and about the memory and time that measures take."""
-        after = self.after
-        size, whole = (_size(number) for number in (after.frame_bytes, self.frames * after.frame_bytes))
+        cost = self.measuring
+        size, whole = (_size(number) for number in (cost.frame_bytes, self.frames * cost.frame_bytes))
         return [
             f"frames: about {self.frames} of {size}, {whole} together",
-            f"smarticles measure: about {_size(after.memory_bytes)} of memory in each process, "
-            f"{_wall_time(after.cpu_s)} of processor time for each run",
+            f"smarticles measure: about {_size(cost.memory_bytes)} of memory in each process, "
+            f"{_wall_time(cost.cpu_s)} of processor time for each run",
         ]
 
     def _engine_to_text(self) -> list[str]:
@@ -207,7 +207,7 @@ def plan(scene: Scene) -> Plan:
         effects=effects,
         engines=tuple(sorted(engines, key=kind.order.index)),
         frames=round(sum(phase.estimate_s for phase in phases) / scene.recording.frame_interval_s),
-        after=_after(scene),
+        measuring=_measuring_cost(scene),
         wall_s=sum(phase.wall_s for phase in phases),
         warnings=warnings_of(scene),
         planar=scene.plane is not None,
@@ -225,11 +225,11 @@ def plan(scene: Scene) -> Plan:
     )
 
 
-def _after(scene: Scene) -> Aftermath:
+def _measuring_cost(scene: Scene) -> MeasuringCost:
     mixture = scene.mixture
     bars = LINKS * scene.count if mixture is None else int(mixture.sizes[mixture.of].sum())
     cells = mixture is None and scene.plane is None and not scene.cylinder.upper
-    return aftermath(scene.count, bars, len(scene.phases), cells=cells)
+    return measuring_cost(scene.count, bars, len(scene.phases), cells=cells)
 
 
 def warnings_of(scene: Scene) -> tuple[str, ...]:

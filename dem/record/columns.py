@@ -16,10 +16,12 @@ class Column(NamedTuple):
     @property
     def components(self) -> tuple[str, ...]:
         """Names of the components of a vector, which the description states; one empty name for a number."""
-        return next((names for text, names in _COMPONENTS.items() if text in self.description), ("",))
+        return next((COMPONENTS[number] for text, number in _VECTORS.items() if text in self.description), ("",))
 
 
-_COMPONENTS = {"(x, y, z)": ("x", "y", "z"), "barb 1 and barb 2": ("barb 1", "barb 2")}
+#: Names of the components of a vector, by their number
+COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
+_VECTORS = {"barb 1 and barb 2": 2, "(x, y, z)": 3}  # what descriptions of vectors state
 
 Columns = Mapping[str, Column]  #: Datasets by name, in the order of the file
 

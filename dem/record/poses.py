@@ -139,6 +139,8 @@ def _read_vtu(path: Path, unit: str | None) -> tuple[PosedBody, ...]:
     found = []
     for number in np.unique(numbers):
         of = np.flatnonzero(numbers == number)
+        if kinds is not None and (kinds[of] != kinds[of[0]]).any():
+            _reject(path, f"body {number} has several kinds")
         kind = None if kinds is None else int(kinds[of[0]])
         found.append(PosedBody(f"body {number}", segments[of], kind))
     return tuple(found)

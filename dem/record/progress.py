@@ -10,7 +10,6 @@ from dem.display import Display, Row
 from dem.errors import RunError
 from dem.record.document import Progress
 from dem.record.names import PROGRESS
-from dem.terminal import warn
 
 INTERVAL = 1.0  # s of wall time between updates
 LATE = 0.8  # share of a phase of unknown length from which on its progress slows down
@@ -108,10 +107,6 @@ class ProgressWriter:
         self._start = start
         self._last = -math.inf
 
-    def warn(self, message: str) -> None:
-        """Print a warning to standard error."""
-        warn(message)
-
     def checkpointed(self, time: float) -> None:
         """Write the simulated time [s] of a new checkpoint without delay."""
         progress = self._progress = self._progress.model_copy(update={"checkpoint_s": time})
@@ -130,8 +125,8 @@ class ProgressWriter:
         index = self._progress.index
         if self._estimate is not None and index is not None:  # the first sample comes before the first phase
             since = max(0.0, time - self._start)
-            shares = self._estimate.done(index, since), self._estimate.left_s(index, since, now)
-            self._progress = self._progress.model_copy(update=dict(zip(("fraction", "left_s"), shares, strict=True)))
+            done, left = self._estimate.done(index, since), self._estimate.left_s(index, since, now)
+            self._progress = self._progress.model_copy(update={"fraction": done, "left_s": left})
         try:
             if self.folder.is_dir():  # a folder that was removed is not made again
                 self._progress.write(self.folder / PROGRESS)

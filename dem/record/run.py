@@ -84,7 +84,7 @@ class Run(Shown):
         yield "engine", f"{made.engine}, {made.fidelity}, seed {made.seed}"
         yield "phases", ", ".join(_timed(phase) for phase in self.phases)
         frames = "none yet"
-        if any((self.path / name).exists() for name in (collection(FRAME), VTKHDF)):
+        if self.has_frames:
             times = self.frames.times
             frames = f"{len(times)}, {times[0]:.4g} s to {times[-1]:.4g} s"
         yield "frames", frames
@@ -133,6 +133,11 @@ class Run(Shown):
     def frames(self) -> FrameSequence:
         """The recorded frames in time order, each read when it is asked for."""
         return read_frames(self.path)
+
+    @property
+    def has_frames(self) -> bool:
+        """Whether the run has written a frame."""
+        return any((self.path / name).is_file() for name in (collection(FRAME), VTKHDF))
 
     @property
     def has_series(self) -> bool:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from dem.arrays import Array
 from dem.errors import InputError
 from dem.record import names
-from dem.record.columns import Columns
+from dem.record.columns import COMPONENTS, Columns
 from dem.record.files import cannot_read, write_whole
 from dem.record.frame import frozen
 
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PERIOD = 1.0  # s of wall time between two rewrites of the file by `keep_up`
-# Suffixes of a vector's components in column names, by the number of components.
-COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
 _REMEDY = "give the directory of a run that has recorded its series, or run it again"
 
 

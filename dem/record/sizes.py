@@ -15,7 +15,7 @@ _SECONDS_PER_SMARTICLE, _SECONDS_PER_BAR = 0.003, 0.0002
 
 
 @dataclass(frozen=True)
-class Aftermath:
+class MeasuringCost:
     """What `smarticles measure` takes for one run, estimated within a factor of about two."""
 
     frame_bytes: int  #: Size of one frame
@@ -23,7 +23,7 @@ class Aftermath:
     cpu_s: float  #: Processor time [s]
 
 
-def aftermath(count: int, bars: int, phases: int, *, cells: bool) -> Aftermath:
+def measuring_cost(count: int, bars: int, phases: int, *, cells: bool) -> MeasuringCost:
     """Return the estimate for a run of `count` bodies with `bars` bars in all.
 
     `cells`: whether Voronoi cells are computed, which is done for smarticles in a cylinder.
@@ -32,4 +32,4 @@ def aftermath(count: int, bars: int, phases: int, *, cells: bool) -> Aftermath:
     if cells:
         memory += min(_CELLS + _PER_SMARTICLE * count, _MOST_CELLS)
         cpu += _SECONDS_PER_SMARTICLE * count
-    return Aftermath(frame_bytes=_FRAME + _BAR * bars, memory_bytes=memory, cpu_s=phases * cpu)
+    return MeasuringCost(frame_bytes=_FRAME + _BAR * bars, memory_bytes=memory, cpu_s=phases * cpu)

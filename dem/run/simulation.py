@@ -20,6 +20,7 @@ from dem.run.recorder import Recorder
 from dem.run.stop import StopRequest, StopRequestedError
 from dem.scene.reading import scene_hash
 from dem.scene.scene import Scene
+from dem.terminal import warn
 
 SMALLEST_CHECKPOINT = 2**20  # bytes; the container alone makes half of it
 
@@ -106,7 +107,7 @@ class Simulation:
     def warn(self, message: str) -> None:
         """Write a warning into the log and to the terminal."""
         self.log.warning("%s", message)
-        self.recorder.progress.warn(message)
+        warn(message)
 
     def _advance(self) -> None:
         engine, recorder, recording = self.engine, self.recorder, self.scene.recording

@@ -48,9 +48,8 @@ from dem.strict import explained
 # Distance of neighbouring spheres, in diameters, of the chains that represent smooth links in pours and pictures. Where
 # such chains do not overlap, the links themselves overlap by a thirtieth of a diameter at most.
 SMOOTH_PITCH = 0.35
-SCHEMA_VERSION: Literal[2] = (
-    2  #: Version of the format of scenes; version 1, which is read too, has another default engine
-)
+#: Version of the format of scenes; version 1, which is read too, has another default engine
+SCHEMA_VERSION: Literal[2] = 2
 ENGINE_OF_VERSION_1 = "yade"
 P = TypeVar("P", bound=Part)
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything

@@ -1,10 +1,13 @@
 """Base of the parts of a scene, and types of numbers that several parts use."""
 
 import difflib
+import re
+from pathlib import Path
 from typing import Annotated, Any, get_args
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, ValidationInfo
 
+from dem.errors import shown
 from dem.strict import Strict
 
 HINGE_RANGE = (-15.0, 105.0)  # deg
@@ -83,6 +86,25 @@ def reject_density_in_other_units(value: float) -> float:
     return value
 
 
+def seen_from_the_scene(path: str, info: ValidationInfo) -> str:
+    """Return the absolute path of a file or directory that a scene names relative to its own file."""
+    if not path.isprintable():
+        raise ValueError(f"{shown(path)} has characters that cannot be printed; give the path of a file or directory")
+    folder = (info.context or {}).get("folder") or Path()
+    return str((Path(folder) / path).resolve())
+
+
+def reject_no_hash(value: str) -> str:
+    """Return a SHA-256; raise ValueError if it is none."""
+    if not re.fullmatch("[0-9a-f]{64}", value):
+        raise ValueError(f"{shown(value)} is no SHA-256 of 64 digits; leave it out, it is filled in")
+    return value
+
+
+ScenePath = Annotated[str, Field(min_length=1), AfterValidator(seen_from_the_scene)]
+Sha256 = Annotated[str, AfterValidator(reject_no_hash)]
+# Numbers, from 0, of bodies in the order in which they were added.
+BodyNumbers = Annotated[tuple[Annotated[int, Field(ge=0, lt=100_000)], ...], Field(min_length=1)]
 # Wide physical limits: numbers beyond them are typing errors, or overflow in sums.
 Length = Annotated[
     float, Field(ge=1e-6, json_schema_extra={"maximum": LONGEST_LENGTH}), AfterValidator(reject_wrong_unit)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from dem.errors import InputError
-from dem.record.columns import EVERY
+from dem.record.columns import COMPONENTS, EVERY
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence
 from dem.record.run import Run
@@ -24,8 +24,6 @@ Costly = Literal["never", "phase-end", "every-frame"]  #: Frames for which costl
 LAST_FRAMES = 20  #: Number of frames averaged at the end of a phase, as in Savoie et al
 
 _LABELS = ("run", "name", SEED, ASPECT, "count", "fidelity", "scene_sha256")
-# Names of a vector's components, by their number.
-_COMPONENTS = {2: ("barb 1", "barb 2"), 3: ("x", "y", "z")}
 # Left out, because the table computes these from the frames.
 _SERIES_MEASURED = frozenset({"time_s", "phase", "count", "com_height_m", "packing_fraction"})
 
@@ -220,7 +218,7 @@ def _series_columns(series: Series, time: float) -> dict[str, float]:
         label = EVERY[name].label if name in EVERY else name
         unit = series.units[name]
         factor = math.degrees(1) if unit == "rad" else 1
-        components = ("",) if values.ndim == 1 else _COMPONENTS[values.shape[1]]
+        components = ("",) if values.ndim == 1 else COMPONENTS[values.shape[1]]
         for component, value in zip(components, np.atleast_1d(values[index]), strict=True):
             columns[_header(label, unit, component)] = factor * float(value)
     return columns

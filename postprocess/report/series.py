@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 
 from dem.arrays import Array
 from dem.errors import InputError
-from dem.record.columns import EVERY
+from dem.record.columns import COMPONENTS, EVERY
 from dem.record.run import Run, open_run
-from dem.record.series import COMPONENTS
 from postprocess.report.figures import BLUE, GREEN, GREY, ORANGE, style
 from postprocess.report.tables import reject_existing, whole_file
 

@@ -8,7 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from dem.terminal import folded, screen_width, warn
+from dem.terminal import say, warn
 from smarticles.command_line import Commands, add_options, columns, positive_number, scene_settings
 from smarticles.commands.study import compute_and_analyse
 from smarticles.sweeps import expected_wall_s, folder_of
@@ -93,7 +93,7 @@ def run_accuracy(arguments: argparse.Namespace) -> int:
     seeds = seeds or accuracy.default_seeds(scene)
     sweep = accuracy.ladder_sweep(scene, ladder, seeds)
     points = expand(sweep)
-    print(folded(_listing(ladder, expected_s, len(seeds), arguments.jobs), width=screen_width()), flush=True)
+    say(_listing(ladder, expected_s, len(seeds), arguments.jobs))
     if len(seeds) < 2:
         warn("the scatter is unknown with one seed, so that no error can be resolved; give --seeds 1,2,3")
     if arguments.dry_run:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from dem.display import progress_of
 from dem.errors import InputError
 from dem.record.names import OF_SWEEP
-from dem.terminal import folded, screen_width, warn
+from dem.terminal import say, warn
 from smarticles import sweeps
 from smarticles.command_line import Commands, add_options, columns
 
@@ -110,7 +110,7 @@ def run_calibrate(arguments: argparse.Namespace) -> int:
     output = arguments.out / "results"
     with progress_of("writing tables and figures"):
         lines = write(result, output, arguments.command_line)
-    print(folded("\n".join(lines), width=screen_width()))
+    say("\n".join(lines))
     print(f"tables and figures: {output}")
     return 0
 

@@ -18,7 +18,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from dem.errors import InputError
-from dem.terminal import folded, screen_width
+from dem.terminal import say
 from smarticles.command_line import Commands, add_options
 from smarticles.starters import path_of
 
@@ -163,10 +163,9 @@ def examine(arguments: argparse.Namespace) -> int:
         found.append(check)
         if not arguments.json:
             state = "ok" if check.ok else "FAILS" if check.needed else "no"
-            print(folded(f"{check.name:<15} {state:<5} {check.found}", width=screen_width()), flush=True)
+            say(f"{check.name:<15} {state:<5} {check.found}")
             if check.way_out:
-                text = f"{'':<15} {'':<5} way out: {check.way_out}"
-                print(folded(text, width=screen_width()), flush=True)
+                say(f"{'':<15} {'':<5} way out: {check.way_out}")
     failed = [check.name for check in found if check.needed and not check.ok]
     if arguments.json:
         print(json.dumps({"ok": not failed, "checks": [asdict(check) for check in found]}, indent=2))

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 
 from dem.display import progress_of
 from dem.errors import InputError
-from dem.terminal import screen_width, warn
+from dem.terminal import text_width, warn
 from smarticles.command_line import Cell, Commands, add_options, as_json, column_blocks, names, reject_existing
 from smarticles.measuring import DONE, STATE, group_columns, grouped, measured, of_phase, sources, states, usual_jobs
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_WIDTH = 100  # most characters of a line of the legend
 _Column = tuple[str, str, str, float]  #: Heading, column of the full table, number format, unit conversion factor
 _ALWAYS = (("phase", "phase type", "", 1.0), ("t [s]", "time [s]", ".2f", 1.0))
 # Shown with --frames only, since their means over several frames have no meaning.
@@ -286,5 +285,4 @@ def _legend(shown: Collection[str], *, per_frame: bool, by: Sequence[str], poure
         lines += [f"at yield: {QUANTITIES[YIELD]}"] if YIELD in shown else []
         lines += [f"at fracture: {QUANTITIES[FRACTURE]}"] if FRACTURE in shown else []
         lines.append(f"widening: {QUANTITIES[WIDENING]}")
-    width = min(screen_width() or _WIDTH, _WIDTH)
-    return "\n".join(["", *(part for line in lines for part in wrap(line, width, subsequent_indent="  "))])
+    return "\n".join(["", *(part for line in lines for part in wrap(line, text_width(), subsequent_indent="  "))])

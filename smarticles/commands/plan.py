@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from dem.errors import InputError
-from dem.terminal import folded, screen_width
+from dem.terminal import say
 from smarticles.command_line import Commands, add_options, as_json, names, positive_number, scene_settings
 from smarticles.commands.run import read_scene
 
@@ -71,8 +71,8 @@ def plan_scene(arguments: argparse.Namespace) -> int:
         print(as_json(content))
         return 0
     if choice is not None:
-        print(folded(f"{choice.to_text()}\n", width=screen_width()))
-    print(folded(planned.to_text(), width=screen_width()))
+        say(f"{choice.to_text()}\n")
+    say(planned.to_text())
     return 0
 
 

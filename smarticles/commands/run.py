@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +12,7 @@ from dem.display import Display, Row
 from dem.errors import InputError
 from dem.record.names import MANIFEST, SCENE
 from dem.run.stop import StopRequest, StopRequestedError, release
-from dem.terminal import warn
+from dem.terminal import complain, warn
 from smarticles import sweeps
 from smarticles.command_line import Commands, add_options, scene_settings
 
@@ -157,7 +156,7 @@ def _run_until(
 
             outcome = run.run_scene(scene, out, command=command, display=display, resume=resume, stop=stop)
     except StopRequestedError as stopped:
-        print(f"smarticles: {stopped}; to be continued: smarticles resume {quoted_out}", file=sys.stderr)
+        complain(f"{stopped}; to be continued: smarticles resume {quoted_out}")
         return TO_BE_CONTINUED
     except KeyboardInterrupt:
         commands = f"measure: smarticles measure {quoted_out}; continue: smarticles resume {quoted_out}"

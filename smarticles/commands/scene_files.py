@@ -9,11 +9,9 @@ from textwrap import wrap
 from typing import Any
 
 from dem.errors import InputError, nearest
-from dem.terminal import screen_width
+from dem.terminal import text_width
 from smarticles.command_line import Commands, add_options, as_json
 from smarticles.starters import KINDS, about, starter
-
-_WIDEST = 100  # characters of a line
 
 
 def add(commands: Commands) -> None:
@@ -87,7 +85,7 @@ def print_keys(arguments: argparse.Namespace) -> int:
         print(
             *_described(schema),
             "",
-            *wrap(f"more, by `smarticles keys NAME`: {', '.join(known)}", _width(), break_on_hyphens=False),
+            *wrap(f"more, by `smarticles keys NAME`: {', '.join(known)}", text_width(), break_on_hyphens=False),
             sep="\n",
         )
         return 0
@@ -133,14 +131,9 @@ def _kinds(entry: Mapping[str, Any]) -> list[str]:
     return next(filter(None, map(_kinds, options)), [])
 
 
-def _width() -> int:
-    """Return the greatest length of a line."""
-    return min(screen_width() or _WIDEST, _WIDEST)
-
-
 def _described(definition: Mapping[str, Any]) -> Iterator[str]:
     """Yield lines of text about a part: its description; default, choices, range and meaning of its keys."""
-    yield from wrap(definition.get("description", ""), _width())
+    yield from wrap(definition.get("description", ""), text_width())
     signs = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
     for key, entry in definition["properties"].items():
         options = entry.get("anyOf", [entry])
@@ -152,7 +145,7 @@ def _described(definition: Mapping[str, Any]) -> Iterator[str]:
             facts.insert(0, f"default {json.dumps(entry['default'], ensure_ascii=False)}")
         value = f": {entry['const']}" if "const" in entry else ""
         yield f"  {key}{value}" + (f"    {', '.join(facts)}" if facts and not value else "")
-        yield from wrap(entry.get("description", ""), _width(), initial_indent=" " * 6, subsequent_indent=" " * 6)
+        yield from wrap(entry.get("description", ""), text_width(), initial_indent=" " * 6, subsequent_indent=" " * 6)
 
 
 def print_schema(_: argparse.Namespace) -> int:

@@ -11,6 +11,7 @@ Sources:
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -18,7 +19,6 @@ import numpy as np
 import pandas as pd
 from scipy.stats import qmc
 
-from dem.display import Shown, unseen
 from studies.calibration.emulator import Array, Emulator, fit
 from studies.calibration.problem import CONDITION, Problem
 from templates.sweep.render import Value
@@ -140,7 +140,10 @@ class Result:
 
 
 def calibrate(
-    problem: Problem, simulator: Simulator, say: Callable[[str], None] = print, shown: Shown = unseen
+    problem: Problem,
+    simulator: Simulator,
+    say: Callable[[str], None] = print,
+    shown: Callable[[str], AbstractContextManager[object]] = nullcontext,
 ) -> Result | None:
     """Run all waves and sample the posterior; return None if runs of a wave are still in a queue.
 

@@ -26,6 +26,25 @@ def test_short_work_says_nothing() -> None:
     assert text.getvalue() == ""
 
 
+class Slow(io.StringIO):
+    """A stream that takes 0.1 s for each text."""
+
+    def write(self, text: str) -> int:
+        time.sleep(0.1)
+        return super().write(text)
+
+
+def test_no_line_follows_the_end() -> None:
+    text = Slow()
+    with Display(text, patience_s=0.01) as display:
+        display.update(Row(label="measured"))
+        time.sleep(0.05)
+    said = text.getvalue()
+    assert said == "measured\n"
+    time.sleep(0.3)
+    assert text.getvalue() == said
+
+
 def test_steps_estimate_the_time_left(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[Row] = []
     monkeypatch.setattr(Display, "update", lambda _, row: seen.append(row))

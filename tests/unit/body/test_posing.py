@@ -150,6 +150,7 @@ def bent_worm(**changes: float) -> NDArray[np.float64]:
         (WORM, bent_worm()[::-1], "bars 0 and 1 are"),
         (SHAPES["rod"], bent_worm()[:1], "bar 0 is 2.5 mm long, that of the scene 20 mm"),
         (None, bent_worm()[:3] * 4, "its points are up to "),
+        (SHAPES["rod"], bent_worm()[:1] * 0, "its points are up to 10 mm off the rod"),
         (
             {**LINKS, "link_m": 0.0025, "links": 12, "joints": {"law": "free"}},
             bent_worm(),

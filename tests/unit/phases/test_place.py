@@ -87,6 +87,9 @@ def test_bodies_that_barely_overlap_are_accepted(tmp_path: Path) -> None:
         (RODS, {"phases.1": {"type": "deposit"}}, "a run starts with one 'deposit', 'place' or 'take-over'"),
         (RODS, {"phases.0.file": "absent.csv"}, "absent.csv cannot be read (No such file or directory)"),
         (RODS, {"phases.0.sha256": "f" * 64}, "has other content than when the scene was made"),
+        (RODS, {"phases.0.sha256": "f" * 64}, "phases.0.sha256: /"),
+        (RODS, {"phases.0.file": ".", "phases.0.sha256": "f" * 64}, "phases.0.file: /"),
+        (RODS, {"phases.0.file": ""}, "phases.0.file: '' is "),
         (RODS, {"particle": [ROD, ROD]}, "poses.csv, body 0 (line 2): kind is None; particle has several shapes"),
     ],
 )

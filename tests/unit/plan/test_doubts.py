@@ -1,5 +1,6 @@
 """Warnings about values that are allowed and probably wrong."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -48,6 +49,13 @@ def test_angles_that_are_radians_are_doubted(changes: dict[str, Any], begin: str
 ])  # fmt: skip
 def test_angles_in_degrees_are_not(changes: dict[str, Any]) -> None:
     assert doubts(changes) == []
+
+
+def test_bodies_that_are_placed_are_no_column(tmp_path: Path) -> None:
+    (tmp_path / "rod.csv").write_text("body,x,y,z\n0,0,0,0.005\n0,0,0,0.205\n")
+    place = {"type": "place", "file": str(tmp_path / "rod.csv"), "unit": "m"}
+    rod = {"engine": "links", "particle": {"shape": "rod", "length_m": 0.2, "diameter_m": 1e-3}}
+    assert doubts({**rod, "count": 1, "container.radius_m": 0.003, "phases": [place]}) == []
 
 
 def test_a_pile_like_a_column_is_doubted_unless_the_wall_is_given() -> None:

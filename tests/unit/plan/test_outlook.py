@@ -181,12 +181,12 @@ def test_strands_are_those_of_each_body(sections: str, least: float, most: float
 def test_a_plan_says_what_frames_and_measures_take() -> None:
     """Sizes as written, and peak memory as measured, of 40 to 600 bodies."""
     one = plan(small({"count": 40}))
-    assert 10_000 < one.after.frame_bytes < 20_000  # 12.8 kB of 40 smarticles
+    assert 10_000 < one.measuring.frame_bytes < 20_000  # 12.8 kB of 40 smarticles
     assert f"frames: about {one.frames} of " in one.to_text()
     for count, most in ((150, 246), (300, 317), (600, 440)):
-        assert most < plan(small({"count": count})).after.memory_bytes / 2**20 < 1.2 * most
+        assert most < plan(small({"count": count})).measuring.memory_bytes / 2**20 < 1.2 * most
     rods = {"engine": "links", "count": 400, "particle": {"shape": "rod", "length_m": 0.012, "diameter_m": 1e-3}}
     planned = plan(small(rods))
-    assert 150 < planned.after.memory_bytes / 2**20 < 190
-    assert 40_000 < planned.after.frame_bytes < 60_000  # 55.5 kB
+    assert 150 < planned.measuring.memory_bytes / 2**20 < 190
+    assert 40_000 < planned.measuring.frame_bytes < 60_000  # 55.5 kB
     assert "smarticles measure: about 166 MiB of memory in each process, 0.2 s of processor time" in planned.to_text()

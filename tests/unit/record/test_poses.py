@@ -46,6 +46,10 @@ def test_frames_of_runs_are_in_metres_above_their_floor(tmp_path: Path) -> None:
     np.testing.assert_allclose(second.segments, [[[0, 1, 0], [3, 4, 3]]])
     with pytest.raises(InputError, match="has the units m and mm, by its header and the key unit; give one"):
         read_poses(tmp_path / "frame.vtu", unit="mm")
+    mesh.cell_data["kind"] = [np.array([1, 0, 0, 2])]
+    mesh.write(tmp_path / "frame.vtu", file_format="vtu")
+    with pytest.raises(InputError, match="body 1 has several kinds"):
+        read_poses(tmp_path / "frame.vtu")
 
 
 @pytest.mark.parametrize(

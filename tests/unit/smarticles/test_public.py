@@ -244,6 +244,13 @@ def test_warnings_of_a_run_are_warnings_of_python(tmp_path: Path) -> None:
         smarticles.run(scene, tmp_path / "a")
 
 
+def test_a_run_that_is_killed_is_an_error_that_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = "import os; os.write(2, b'smarticles: warning: odd\\nat 30 \\xb0\\n'); os.kill(os.getpid(), 9)"
+    monkeypatch.setattr("smarticles.public.smarticles_command", lambda *_: [sys.executable, "-c", script])
+    with pytest.raises(smarticles.RunError, match=r"^killed by SIGKILL \(out of memory\?\): at 30 "):
+        smarticles.run(tmp_path / "scene.yaml", tmp_path / "out", progress=False)
+
+
 def test_errors_of_a_run_name_arguments(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").touch()
     with pytest.raises(smarticles.InputError) as raised:
