@@ -114,7 +114,8 @@ class Display:
                 redirect_stderr=False,
             )
             self._stack.enter_context(self._live)
-            self._stack.enter_context(redirect_stderr(cast(TextIO, _Above(self.print))))
+            above = self._stack.enter_context(_Above(self.print))
+            self._stack.enter_context(redirect_stderr(cast(TextIO, above)))
         else:
             writer = threading.Thread(target=self._write_lines, daemon=True)
             writer.start()
@@ -214,6 +215,12 @@ class _Above(io.TextIOBase):
 
     def isatty(self) -> bool:
         return True
+
+    def close(self) -> None:
+        last, self._begun = self._begun, ""
+        if last:
+            self._print(last)
+        super().close()
 
 
 @contextmanager
