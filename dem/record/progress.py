@@ -1,7 +1,7 @@
 """Progress of a running simulation, in `progress.json` and on a display."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import monotonic
@@ -90,6 +90,7 @@ class ProgressWriter:
     folder: Path  #: The run directory
     total: int  #: Number of bodies in the scene
     costs: Sequence[PhaseCost] = ()  #: Expected cost of the phases; empty: the time left is unknown
+    lifted: Container[int] = ()  #: Numbers of phases in which bodies hang, so that they are no pile with a φ
     display: Display | None = None  #: Shows the progress
     _progress: Progress = field(default_factory=Progress)
     _begun: float = field(init=False)
@@ -116,13 +117,13 @@ class ProgressWriter:
 
     def update(self, *, time: float, phi: float, count: int) -> None:
         """Write simulated time [s], packing fraction [1] and number of bodies, at most once per second."""
-        now, known_phi = monotonic(), phi if math.isfinite(phi) else None
+        now, index = monotonic(), self._progress.index
+        known_phi = phi if math.isfinite(phi) and index not in self.lifted else None
         update = {"time_s": time, "phi": known_phi, "count": count, "wall_s": now - self._begun}
         self._progress = self._progress.model_copy(update=update)
         if now - self._last < INTERVAL:
             return
         self._last = now
-        index = self._progress.index
         if self._estimate is not None and index is not None:  # the first sample comes before the first phase
             since = max(0.0, time - self._start)
             done, left = self._estimate.done(index, since), self._estimate.left_s(index, since, now)

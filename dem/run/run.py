@@ -85,8 +85,10 @@ def run_scene(
             # A directory with a manifest counts as a run, which can be resumed if it was killed before this line.
             _keep_scene(scene, out)
         (out / FAILED).unlink(missing_ok=True)
+        held = Run(out).manifest.held
+        lifted = frozenset(filter(held, range(len(scene.phases))))
         with log_of(out) as log:
-            bar = ProgressWriter(out, scene.count, costs=_costs(scene, steps), display=display)
+            bar = ProgressWriter(out, scene.count, costs=_costs(scene, steps), lifted=lifted, display=display)
             simulation: Simulation | None = None
             try:
                 simulation = Simulation(

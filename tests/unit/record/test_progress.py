@@ -103,6 +103,14 @@ def test_rows_name_phase_and_numbers() -> None:
     assert row_of(shake, label="a").to_text() == "a 70 %, shake (3 of 4)  t = 1.40 s, 0:03 left"
 
 
+def test_bodies_that_hang_have_no_packing_fraction(tmp_path: Path, wall: Wall) -> None:
+    writer = ProgressWriter(tmp_path, 2, lifted={1})
+    for index, phi in ((0, 0.1), (1, None)):
+        writer.begin(phase="lift", index=index, start=0.0, end=1.0)
+        writer.update(time=0.2, phi=0.1, count=2)
+        assert json.loads((tmp_path / "progress.json").read_text()).get("phi") == phi
+
+
 def test_a_checkpoint_is_reported_at_once(tmp_path: Path, wall: Wall) -> None:
     def written() -> tuple[float, float | None]:
         data = json.loads((tmp_path / "progress.json").read_text())
