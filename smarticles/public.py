@@ -397,6 +397,7 @@ def sweep(
     vary: Varied | None = None,
     zip: Varied | None = None,  # noqa: A002  (as in sweep files)
     jobs: int | None = None,
+    progress: bool = True,
 ) -> SweepDirectory:
     """Compute the missing runs of a sweep on this machine, and return the finished sweep.
 
@@ -410,6 +411,7 @@ def sweep(
         zip: the same for keys that change together: one point for the first values of all keys, one for the second
             ones, and so on. With `vary` all combinations of these points and its values are run.
         jobs: number of simultaneous runs; None: one per core.
+        progress: show runs that are computed, and lines about those that ended.
 
     Raises:
         InputError: a scene or the sweep is not valid, or the directory contains other files.
@@ -427,7 +429,7 @@ def sweep(
             file, words = write_sweep(scene, vary or {}, Path(scratch), zip or {}), ["resume", str(out)]
         again = shlex.join(["smarticles", *words])
         folder = make_folder(file, out, again)
-    raise_failures(folder, compute(folder, jobs=jobs, command=again))
+    raise_failures(folder, compute(folder, jobs=jobs, command=again, progress=progress))
     return SweepDirectory(folder)
 
 

@@ -262,6 +262,15 @@ def test_a_run_takes_the_keys_of_a_scene(tmp_path: Path) -> None:
     assert not (tmp_path / "b").exists()
 
 
+@pytest.mark.parametrize("progress", [True, False])
+def test_a_sweep_shows_its_progress_unless_it_is_turned_off(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], progress: bool
+) -> None:
+    keys = {"seed": 1, "count": 1, "fidelity": "draft", "phases": [{"type": "deposit"}]}
+    assert len(smarticles.sweep(keys, tmp_path / "a", vary={"count": [1]}, progress=progress)) == 1
+    assert ("count1" in "".join(capfd.readouterr())) == progress
+
+
 def test_warnings_of_a_run_are_warnings_of_python(tmp_path: Path) -> None:
     scene = scene_of(fidelity="draft", smarticle={"angles_deg": [90, 1.57]})
     with pytest.warns(UserWarning, match=r"^smarticle\.angles_deg: 1\.57 means 1\.57°, .* write 90$"):
