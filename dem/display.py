@@ -200,6 +200,20 @@ class Display:
         self._cell.update(HTML(text))
 
 
+class NoDisplay(Display):
+    """Shows nothing."""
+
+    def __enter__(self) -> Self:
+        """Show nothing."""
+        return self
+
+    def print(self, line: str) -> None:
+        """Write nothing."""
+
+    def update(self, *rows: Row) -> None:
+        """Show nothing."""
+
+
 class _Above(io.TextIOBase):
     """A stream whose lines are printed above the rows of a display."""
 

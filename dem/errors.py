@@ -1,6 +1,7 @@
 """Errors of the project, `InputError` and `RunError`, and functions that word their messages."""
 
 import difflib
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -21,11 +22,14 @@ def reject(failing: Any, time: float, cause: str, way_out: str) -> None:
         raise RunError(f"at t = {time:.4f} s: {len(ids)} smarticle(s) ({shown}): {cause}; {way_out}")
 
 
+_BREAK = re.compile(r"\s*\n\s*")  # as in arrays
+
+
 def shown(value: object) -> str:
     """Return a value as YAML in one line; after 60 characters an ellipsis replaces the rest."""
     constants = {None: "null", True: "true", False: "false"}
     try:
-        text = constants[value] if value is None or isinstance(value, bool) else repr(value)
+        text = constants[value] if value is None or isinstance(value, bool) else _BREAK.sub(" ", repr(value))
     except ValueError:  # a whole number of thousands of digits
         text = "a number of thousands of digits"
     return text if len(text) <= 60 else f"{text[:60]}…"

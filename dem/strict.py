@@ -16,8 +16,8 @@ _WITH_UNIT = re.compile(r"\s*[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*[^\W\d]\S*\s*")
 _WITH_COMMA = re.compile(r"\s*[-+]?\d+,\d+\s*")
 # Words that may end a key, and how the unit that they spell is written.
 _UNITS = {
-    **{word: word for word in ("m", "s", "g", "w", "N", "J", "kg", "rad", "deg")},
-    **{"hz": "Hz", "m3": "m³", "s2": "s²", "per": "/"},
+    **{word: word for word in ("m", "cm", "mm", "um", "s", "ms", "g", "w", "N", "J", "Pa", "kg", "rad", "deg")},
+    **{"hz": "Hz", "m2": "m²", "m3": "m³", "mm2": "mm²", "mm3": "mm³", "s2": "s²", "per": "/"},
 }
 _TAGS = ("type", "shape", "law")  # keys that say which member of a union a mapping is
 _TAG_OF = {"particle": "shape", "joints": "law"}  # the one that a key needs; all others need `type`
@@ -191,7 +191,8 @@ def unit_of(key: str) -> tuple[str, str]:
     count = len(words)
     while count > 1 and words[count - 1] in _UNITS:
         count -= 1
-    return "_".join(words[:count]), " ".join(_UNITS[word] for word in words[count:]).replace(" / ", "/")
+    unit = " ".join(_UNITS[word] for word in words[count:]).replace(" / ", "/")
+    return "_".join(words[:count]), re.sub("^/ ", "1/", unit)
 
 
 def _text(kind: str, message: str, value: Any, context: Mapping[str, Any], unit: str) -> str:

@@ -63,7 +63,8 @@ install_environment() {
     /usr/bin/python3 -m venv --system-site-packages .venv
     local pip=(.venv/bin/python -m pip -qq --disable-pip-version-check --no-input)
     "${pip[@]}" install "${requirements[@]}"
-    "${pip[@]}" install --no-deps --no-build-isolation --editable .
+    # Python asks a finder, the usual mode, only after the working directory, where this clone may be a folder smarticles.
+    "${pip[@]}" install --no-deps --no-build-isolation --config-settings editable_mode=compat --editable .
     # Keeps Debian's mpl_toolkits from taking the place of the environment's.
     local packages
     packages=$(.venv/bin/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')

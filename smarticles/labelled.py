@@ -44,6 +44,8 @@ def dataset_of(table: pd.DataFrame, values: Sequence[Mapping[str, Any]]) -> Any:
     columns = [name for name in table.columns if str(name).endswith("]")]
     index = pd.MultiIndex.from_frame(points[leading]) if len(leading) > 1 else pd.Index(points[leading[0]])
     found = xarray.Dataset.from_dataframe(table[columns].set_axis(index))
+    # xarray sorts; names of values have no order but that of the sweep.
+    found = found.reindex({name: points[name].unique() for name in leading if name != "run" and _named(points[name])})
     for name in columns:
         found[name].attrs["units"] = str(name).rpartition("[")[2][:-1]
     for name in varied:
@@ -54,6 +56,10 @@ def dataset_of(table: pd.DataFrame, values: Sequence[Mapping[str, Any]]) -> Any:
         found = found.assign_coords({name: (leader, known.reindex(found[leader].values).to_numpy())})
     texts = [name for name in _TEXTS if name in table.columns and name not in leading]
     return found.assign_coords(xarray.Dataset.from_dataframe(table[texts].set_axis(index)).data_vars)
+
+
+def _named(values: pd.Series[Any]) -> bool:
+    return all(isinstance(value, str) for value in values)
 
 
 def _led(name: str, before: Sequence[str], after: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> bool:

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dem.display import Steps, silent
-from dem.errors import InputError, nearest
+from dem.errors import InputError, nearest, shown
 from dem.record.names import OF_SWEEP
 from dem.record.sizes import measuring_cost
 from smarticles.kept_tables import keep, key_of, read_kept
@@ -221,11 +221,17 @@ def as_cell(value: Any) -> Any:
     return value if isinstance(value, str | int | float | bool) else json.dumps(value, ensure_ascii=False)
 
 
-def of_phase(table: pd.DataFrame, phase: str) -> pd.DataFrame:
-    """Select rows of a table of `measured` by type of phase; "last" selects the last phase of each run.
+def of_phase(table: pd.DataFrame, phase: str | int) -> pd.DataFrame:
+    """Select rows of a table of `measured` by type or number of phase; "last" selects the last phase of each run.
 
-    InputError if no run has a phase of this type.
+    InputError if no run has such a phase.
     """
+    if not isinstance(phase, str):
+        chosen = table["phase"] == phase
+        if isinstance(phase, bool) or not chosen.any():
+            numbers = ", ".join(str(number) for number in sorted(set(table["phase"])))
+            raise InputError(f"phase: no run has frames of phase {shown(phase)}; known: {numbers}")
+        return table[chosen].reset_index(drop=True)
     if phase == "last":
         return table[table["phase"] == table.groupby("run")["phase"].transform("max")].reset_index(drop=True)
     if not (table["phase type"] == phase).any():

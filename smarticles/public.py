@@ -150,7 +150,7 @@ class SweepDirectory(Sequence[Run]):
     def to_xarray(
         self,
         *,
-        phase: str = "last",
+        phase: str | int = "last",
         also: Sequence[str] = (),
         measures: Sequence[OwnMeasure] = (),
         jobs: int = 1,
@@ -158,7 +158,8 @@ class SweepDirectory(Sequence[Run]):
         """Return the measures of one phase of all runs as a `Dataset` of xarray, see `dataset_of`.
 
         Args:
-            phase: type of phase; "last": the last phase of each run.
+            phase: type of phase, of which the last one of each run that has frames is taken; "last": of all types;
+                or the number of a phase in the scene, from 0.
             also: names of measures on request, as for `table`.
             measures: further measures, as for `table`.
             jobs: number of processes, as for `table`.
@@ -201,23 +202,23 @@ def run(
         RunError: the run failed or was stopped.
         KeyboardInterrupt: Ctrl-C stopped the run; all its files are complete.
     """
-    scene = _scene_or_file(scene)
+    scene, out = _scene_or_file(scene), _path("out", out)
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch, _in_words_of_python(scratch):
         file = Path(scratch, "scene.yaml") if isinstance(scene, Scene) else Path(scene)
         if isinstance(scene, Scene):
             file.write_text(dump_scene(scene), encoding="utf-8")
-        held = (Path(out) / MANIFEST).is_file()
-        words = [*smarticles_command(file, Path(out), resume and held), "--threads", str(threads)]
+        held = (out / MANIFEST).is_file()
+        words = [*smarticles_command(file, out, resume and held), "--threads", str(threads)]
         words += [] if ranks is None else ["--ranks", str(ranks)]
         if isinstance(scene, Scene):
             # The file in the temporary folder will not exist; `scene.yaml` in the run directory will.
-            words += ["--recorded-as", shlex.join(["smarticles", "run", str(Path(out) / SCENE), "--out", "NEW"])]
+            words += ["--recorded-as", shlex.join(["smarticles", "run", str(out / SCENE), "--out", "NEW"])]
         with Path(scratch, "said").open("w+", encoding="utf-8", errors="replace") as said:
             # In a session of its own: Ctrl-C reaches this process alone, which signals the run once.
             process = subprocess.Popen(
                 words, env=environment(), stdout=subprocess.DEVNULL, stderr=said, start_new_session=True
             )
-            status = _wait(process, Path(out), progress=progress)
+            status = _wait(process, out, progress=progress)
             said.seek(0)
             output = said.read()
         if status:
@@ -225,7 +226,7 @@ def run(
     for line in output.splitlines():
         if line.startswith(_WARNING):
             warnings.warn(line.removeprefix(_WARNING), stacklevel=2)
-    return Run(Path(out))
+    return Run(out)
 
 
 def _scene_or_file(given: Scene | Mapping[str, Any] | Path | str) -> Scene | Path:
@@ -261,16 +262,29 @@ def _wait(process: subprocess.Popen[bytes], out: Path, *, progress: bool) -> int
 
 def read(directory: Path | str) -> Run:
     """Open the directory of a finished or unfinished run; raise InputError for any other directory."""
-    return open_run(directory)
+    return open_run(_path("directory", directory))
+
+
+def _path(name: str, given: object) -> Path:
+    """Return the directory of a run or a sweep, or a path itself; InputError for anything else."""
+    if isinstance(given, Run | SweepDirectory):
+        return given.path
+    if isinstance(given, str | os.PathLike):
+        return Path(given)
+    raise InputError(f"{name}: {shown(given)} is no directory; give its path, or a run that was read")
 
 
 def measure(
-    run: Run | Path | str, *, frames: bool = False, also: Sequence[str] = (), measures: Sequence[OwnMeasure] = ()
+    run: Run | SweepDirectory | Path | str,
+    *,
+    frames: bool = False,
+    also: Sequence[str] = (),
+    measures: Sequence[OwnMeasure] = (),
 ) -> pd.DataFrame:
-    """Return the measures of a run as a table, as `smarticles measure` does.
+    """Return the measures of a run or a sweep as a table, as `smarticles measure` does.
 
     Args:
-        run: run, or its directory.
+        run: run or sweep, or its directory.
         frames: return one row per frame.
         also: names of further measures, which take long or are seldom needed, such as "crossing-number".
         measures: further measures; a function of a frame and its run returns a number, an array of numbers or a dict of
@@ -283,8 +297,7 @@ def measure(
     Raises:
         InputError: the directory is not a run directory, the run has no frames yet, or a name is unknown.
     """
-    directory = run.path if isinstance(run, Run) else Path(run)
-    return measured([directory], frames=frames, also=_names(also), measures=_measures(measures))
+    return measured([_path("run", run)], frames=frames, also=_names(also), measures=_measures(measures))
 
 
 def _names(also: Sequence[str]) -> tuple[str, ...]:
@@ -348,15 +361,14 @@ def plot(
                 raise InputError(f"{name}: is for pictures of the pile, and series are drawn; leave one of them out")
         from postprocess.report.series import draw_series  # noqa: PLC0415  (of the extra "viz")
 
-        opened = open_run(run.path if isinstance(run, Run) else run)
-        return draw_series(opened, [series] if isinstance(series, str) else list(series))
+        return draw_series(open_run(_path("run", run)), [series] if isinstance(series, str) else list(series))
     from PIL import Image as images  # noqa: N813, PLC0415  (of the extra "viz")
 
     from postprocess.pictures.render import render_run  # noqa: PLC0415
 
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch:
         picture = Path(scratch, "pile.png")
-        render_run(run.path if isinstance(run, Run) else Path(run), output=picture, time=time, color_by=color_by)
+        render_run(_path("run", run), output=picture, time=time, color_by=color_by)
         with images.open(picture) as image:
             return image.copy()
 
@@ -374,7 +386,7 @@ def read_sweep(directory: Path | str) -> SweepDirectory:
     Raises:
         InputError: the directory is not that of a sweep.
     """
-    return SweepDirectory(open_folder(Path(directory)))
+    return SweepDirectory(open_folder(_path("directory", directory)))
 
 
 def sweep(
@@ -384,6 +396,7 @@ def sweep(
     vary: Varied | None = None,
     zip: Varied | None = None,  # noqa: A002  (as in sweep files)
     jobs: int | None = None,
+    progress: bool = True,
 ) -> SweepDirectory:
     """Compute the missing runs of a sweep on this machine, and return the finished sweep.
 
@@ -397,13 +410,14 @@ def sweep(
         zip: the same for keys that change together: one point for the first values of all keys, one for the second
             ones, and so on. With `vary` all combinations of these points and its values are run.
         jobs: number of simultaneous runs; None: one per core.
+        progress: show runs that are computed, and lines about those that ended.
 
     Raises:
         InputError: a scene or the sweep is not valid, or the directory contains other files.
         RunError: a run failed.
     """
     with tempfile.TemporaryDirectory(prefix="smarticles-") as scratch, _in_words_of_python(scratch):
-        scene = _scene_or_file(what)
+        scene, out = _scene_or_file(what), _path("out", out)
         if vary is None and zip is None:
             if isinstance(scene, Scene):
                 msg = "vary: is missing; give the keys of the scene that change, e.g. vary={'seed': [1, 2, 3]}"
@@ -413,8 +427,8 @@ def sweep(
             # Without a sweep file, `resume` continues from the scenes in the directory.
             file, words = write_sweep(scene, vary or {}, Path(scratch), zip or {}), ["resume", str(out)]
         again = shlex.join(["smarticles", *words])
-        folder = make_folder(file, Path(out), again)
-    raise_failures(folder, compute(folder, jobs=jobs, command=again))
+        folder = make_folder(file, out, again)
+    raise_failures(folder, compute(folder, jobs=jobs, command=again, progress=progress))
     return SweepDirectory(folder)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from dem.display import Display
+from dem.display import Display, NoDisplay
 from dem.errors import InputError, RunError
 from smarticles.command_line import Parser, add_options, positive_int
 
@@ -79,17 +79,17 @@ def expected_wall_s(scene: Scene) -> float:
 # -- on this machine ---------------------------------------------------------------------------------------------------
 
 
-def compute(folder: Folder, *, jobs: int | None, command: str) -> list[Outcome]:
+def compute(folder: Folder, *, jobs: int | None, command: str, progress: bool = True) -> list[Outcome]:
     """Compute the missing runs of a sweep on this machine.
 
-    After Ctrl-C, the KeyboardInterrupt names `command`, which continues the sweep.
+    After Ctrl-C, the KeyboardInterrupt names `command`, which continues the sweep. `progress`: show what runs and ends.
     """
     from templates.local import SweepDisplay, run_folder  # noqa: PLC0415
     from templates.slurm.submission import reject_queued  # noqa: PLC0415
 
     reject_queued(folder)
     try:
-        return run_folder(folder, SweepDisplay(Display()), slots=jobs)
+        return run_folder(folder, SweepDisplay(Display() if progress else NoDisplay()), slots=jobs)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"finished runs are kept; continue with: {command}") from None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from numbers import Real
 from operator import attrgetter
 from pathlib import Path
 from typing import overload
@@ -141,7 +142,14 @@ class FrameSequence(Sequence[Frame]):
         return self[bisect_right(self.times, time + 1e-8 * max(abs(time), 1.0)) :]
 
     def in_phase(self, phase: int) -> FrameSequence:
-        """Return the frames of the phase with index `phase`; bisection reads only a few files."""
+        """Return the frames of the phase with index `phase`; bisection reads only a few files.
+
+        Raises InputError if `phase` is not 0, 1, 2, …
+        """
+        if not (isinstance(phase, Real) and phase >= 0 and phase % 1 == 0):
+            raise InputError(
+                f"in_phase: {shown(phase)} is no number of a phase; give one from 0, as the scene lists them"
+            )
         first = bisect_left(self, phase, key=attrgetter("phase"))
         last = bisect_right(self, phase, lo=first, key=attrgetter("phase"))
         return self[first:last]

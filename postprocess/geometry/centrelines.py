@@ -1,5 +1,6 @@
 """Read centre lines of bodies from a file, such as those of a tomography, as segments."""
 
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NoReturn
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from dem.errors import InputError, nearest
+from dem.errors import InputError, nearest, shown
 from dem.record.files import cannot_read, read_csv
 from dem.record.frame import frozen
 from dem.record.poses import UNITS
@@ -54,6 +55,8 @@ def read_centrelines(path: Path | str, *, unit: str | None = None) -> Centreline
     Raises:
         InputError: The file is missing, damaged or without segments, or its unit is unknown.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise InputError(f"centre lines: {shown(path)} is no file; give its path; of a frame, use segments_of(frame)")
     path = Path(path)
     suffix = path.suffix.lower()
     if unit is not None:
@@ -225,7 +228,7 @@ def _whole(path: Path, values: NDArray[Any], what: str, number: Whole) -> Whole:
 def _factor(path: Path, unit: str) -> float:
     """Return a unit of length in metres; InputError, which names the file `path`, if it is unknown."""
     if unit not in UNITS:
-        raise InputError(f"{path}: unit {unit!r} is unknown; {nearest(unit, UNITS)}")
+        raise InputError(f"{path}: unit {unit!r} is unknown; {nearest(str(unit), UNITS)}")
     return UNITS[unit]
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
 
-from dem.errors import InputError
+from dem.errors import InputError, shown
 from dem.record.frame import Frame
 from dem.record.frames import FrameSequence
 from dem.record.run import Run
@@ -37,12 +37,20 @@ class UndefinedMeasureError(InputError):
     """
 
 
+def floats(name: str, given: object, way_out: str) -> Floats:
+    """Return data as an array of numbers; InputError, which names the data and a way out, if they are none."""
+    try:
+        return np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name}: {shown(given)} is no array of numbers; {way_out}") from None
+
+
 def checked_vertices(vertices: Vertices) -> Floats:
     """Return vertices as a float64 array (N, 4, 3) [m] after checking them.
 
     InputError for a wrong shape, a value that is not finite, or a smarticle of length 0.
     """
-    array = np.asarray(vertices, dtype=np.float64)
+    array = floats("vertices", vertices, "pass a frame, or frame.vertices")
     if array.ndim == 3 and array.shape[1] == 0 and len(array):
         raise InputError(
             f"{len(array)} bodies of a scene with the key particle have no barbs: use frame.segments, frame.bodies"

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from dem.errors import InputError
 from dem.record.frames import FrameSequence
-from postprocess.geometry.links import Flags, Floats, Whole, centres_of_mass
+from postprocess.geometry.links import Flags, Floats, Whole, centres_of_mass, floats
 
 _EVEN = 1e-3  # largest deviation of a time between frames, over their interval [1]
 
@@ -51,7 +51,8 @@ def mean_squared_displacement(
     """
     if isinstance(positions, FrameSequence):
         times, positions = positions.times if times is None else times, centres_of_mass(positions)
-    places, when = np.asarray(positions, dtype=np.float64), np.asarray(times, dtype=np.float64)
+    places = floats("positions", positions, "give frames of a run, such as run.frames.in_phase(1)[:-1]")
+    when = np.asarray(times, dtype=np.float64)
     if places.ndim != 3 or places.shape[2] != 3 or len(places) < 2:
         raise InputError(f"positions must be (T, N, 3) [m] at 2 times or more: got {places.shape}; give a run's frames")
     if when.shape != places.shape[:1]:

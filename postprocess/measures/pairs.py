@@ -6,13 +6,14 @@ points thus give 1 at all distances, also near those at which the finite cylinde
 
 import math
 from dataclasses import dataclass, field
+from numbers import Integral, Real
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from dem.errors import InputError
-from postprocess.geometry.links import Floats, Whole
+from dem.errors import InputError, shown
+from postprocess.geometry.links import Floats, Whole, floats
 
 _NODES = 200  # of the quadrature over directions
 
@@ -118,7 +119,7 @@ def orientation_correlation(
         InputError: Fewer than 2 points or 1 shell, a value that is not finite, or axes of another number or length 0.
     """
     points, edges = _checked(centres, longest, bins)
-    vectors = np.asarray(axes, dtype=np.float64)
+    vectors = floats("axes", axes, "give a direction for each point, such as frame.bodies.rotation[:, :, 0]")
     if vectors.shape != points.shape:
         raise InputError(f"axes must be {points.shape}, one for each point: got {vectors.shape}")
     lengths = np.linalg.norm(vectors, axis=1)
@@ -141,14 +142,18 @@ def orientation_correlation(
 
 def _checked(centres: ArrayLike, longest: float, bins: int) -> tuple[Floats, Floats]:
     """Return points (N, 3) [m] and the edges (bins + 1,) of shells [m] after checking them."""
-    points = np.asarray(centres, dtype=np.float64)
+    points = floats("centres", centres, "give those of one frame, centres_of_mass(frame)")
     if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
         raise InputError(f"centres must be (N, 3) [m] of 2 bodies or more: got {points.shape}; give those of one frame")
     finite = np.isfinite(points).all(axis=1)
     if not finite.all():
         raise InputError(f"centres must be finite [m]: that of body {int(np.argmin(finite))} is not; leave it out")
-    if not (0 < longest < math.inf and bins >= 1):
-        raise InputError(f"shells need a longest distance above 0 m and 1 bin or more: got {longest} m, {bins} bins")
+    numbers = isinstance(longest, Real) and isinstance(bins, Integral)
+    if not numbers or not (0 < longest < math.inf and bins >= 1):
+        raise InputError(
+            "shells need a number above 0 m as longest distance, and a whole number of bins, 1 or more: got "
+            f"{shown(longest)} m, {shown(bins)} bins"
+        )
     return points, np.linspace(0.0, longest, bins + 1)
 
 

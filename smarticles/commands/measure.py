@@ -126,7 +126,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     print(_text(table, by, shown))
     poured = bool((table["phase type"] == POUR).any())
     print(_legend({column for _, column, _, _ in shown}, per_frame=arguments.frames, by=by, poured=poured))
-    for note in _notes(table) if runs is None else _left_out(runs, unfinished=arguments.unfinished):
+    notes = _notes(table) if runs is None else _left_out(runs, unfinished=arguments.unfinished)
+    for note in [*notes, *_without_frames(directories)]:
         print(f"note: {note}")
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
@@ -220,6 +221,26 @@ def _notes(table: pd.DataFrame) -> list[str]:
                 f"{where}: force_limit_N stopped the hook after {height_mm:.3g} mm; the peak force is a lower bound"
             )
     return notes
+
+
+def _without_frames(directories: Sequence[Path]) -> list[str]:
+    """Return a note for each phase of finished runs that has samples and no frame, and thus no row."""
+    from dem.record.run import Run  # noqa: PLC0415
+
+    found: dict[tuple[int, str], list[Path]] = {}
+    for run in map(Run, directories):
+        if run.status.state != DONE or run.lost_series:
+            continue
+        sampled = run.series["phase"]
+        for phase in run.manifest.phases:
+            # A phase of one time step, such as place, has one sample at most.
+            if (sampled == phase.index).sum() > 1 and not run.frames.in_phase(phase.index):
+                found.setdefault((phase.index, phase.type), []).append(run.path)
+    return [
+        f"{runs[0]}{f' and {len(runs) - 1} more' if runs[1:] else ''}: phase {index} ({kind}) ended before a frame was "
+        "due, and has no row; lower recording.frame_interval_s"
+        for (index, kind), runs in sorted(found.items())
+    ]
 
 
 def _left_out(runs: pd.DataFrame, *, unfinished: bool) -> list[str]:

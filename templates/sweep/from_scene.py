@@ -68,6 +68,8 @@ def variables(vary: Mapping[str, Any], zipped: Mapping[str, Any]) -> list[Variab
     for source, given in sources.items():
         if not isinstance(given, Mapping):
             raise InputError(f"{source}: {shown(given)} is no mapping; give values by key, e.g. {{'seed': [1, 2, 3]}}")
+        if other := [key for key in given if not isinstance(key, str)]:
+            raise InputError(f"{source}: {shown(other[0])} is no text; give a key of the scene, e.g. 'seed'")
     if both := [key for key in vary if key in zipped]:
         raise InputError(f"zip: {both[0]}: is in vary, too; leave it out of one of them")
     keys = [*zipped, *vary]

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -42,12 +43,19 @@ def sources(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def wheel(sources: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the wheel from a fresh copy."""
-    clone, out = tmp_path_factory.mktemp("clone"), tmp_path_factory.mktemp("wheel")
+def clone(sources: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a fresh copy of the repository, in a folder of its name."""
+    place = tmp_path_factory.mktemp("clone") / "smarticles"
     for name in sources:
-        (clone / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / name, clone / name, follow_symlinks=False)
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(ROOT / name, place / name, follow_symlinks=False)
+    return place
+
+
+@pytest.fixture(scope="module")
+def wheel(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the wheel from a fresh copy."""
+    out = tmp_path_factory.mktemp("wheel")
     pip = (sys.executable, "-m", "pip", "-q", "--disable-pip-version-check", "wheel", "--no-deps", "--no-index")
     call(*pip, "--no-build-isolation", "--wheel-dir", out, ".", cwd=clone)
     (built,) = out.iterdir()
@@ -107,3 +115,16 @@ def test_a_study_is_analysed_from_the_wheel(smarticles: Callable[..., str], tmp_
     assert said.startswith("not the full study: ")
     assert (out / "results" / "deviations.csv").is_file()
     assert (out / "results" / "run.png").is_file()
+
+
+def test_the_installed_clone_is_imported_from_the_folder_that_holds_it(clone: Path, tmp_path: Path) -> None:
+    place = tmp_path / "environment"
+    call(sys.executable, "-m", "venv", "--without-pip", "--system-site-packages", place, cwd=tmp_path)
+    python = place / "bin" / "python"
+    packages = Path(call(python, "-c", "import sysconfig; print(sysconfig.get_path('purelib'))", cwd=place).strip())
+    (packages / "libraries.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    (words,) = re.findall(r" install (.*--editable .*)", (clone / "setup" / "install.sh").read_text())
+    pip = (sys.executable, "-m", "pip", "-q", "--disable-pip-version-check", "--python", python)
+    call(*pip, "install", "--no-index", "--ignore-installed", *words.split(), cwd=clone)
+    said = call(python, "-c", "import smarticles; print(smarticles.Scene, smarticles.__file__)", cwd=clone.parent)
+    assert str(clone) in said

@@ -190,3 +190,12 @@ def test_a_plan_says_what_frames_and_measures_take() -> None:
     assert 150 < planned.measuring.memory_bytes / 2**20 < 190
     assert 40_000 < planned.measuring.frame_bytes < 60_000  # 55.5 kB
     assert "smarticles measure: about 166 MiB of memory in each process, 0.2 s of processor time" in planned.to_text()
+
+
+def test_a_plan_names_phases_that_may_have_no_frame() -> None:
+    phases = [{"type": "deposit"}, *({"type": "relax", "duration_s": duration} for duration in (0.039, 0.04, 0.02))]
+    said = plan(small({"phases": phases, "recording": {"frame_interval_s": 0.04}})).to_text()
+    assert [line[:14] for line in said.splitlines() if "may have no frame" in line] == [
+        "phase 1 relax:",
+        "phase 3 relax:",
+    ]

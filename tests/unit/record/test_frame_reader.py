@@ -46,6 +46,14 @@ def test_frames_are_a_sequence_in_time_order(make_run):
         frames[4]
 
 
+@pytest.mark.parametrize("phase", ["shake", -1, 0.5, None])
+def test_what_is_no_number_of_a_phase_is_rejected(make_run, phase):
+    frames = read_frames(make_run([(0, 0.0), (1, 0.0), (1, 0.0)]))
+    assert [len(frames.in_phase(number)) for number in (0, np.int64(1), 2)] == [1, 2, 0]
+    with pytest.raises(InputError, match=r"^in_phase: .* is no number of a phase; give one from 0"):
+        frames.in_phase(phase)
+
+
 def test_frames_after_a_time(make_run):
     """Those at that very time are not later, and no file is read for it."""
     run = make_run([(0, 0.0), (0, 0.0), (0, 0.0), (0, 0.0)])

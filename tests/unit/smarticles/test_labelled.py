@@ -72,6 +72,25 @@ def test_a_sweep_becomes_a_dataset_of_its_last_or_a_named_phase(swept: smarticle
         swept.to_xarray(phase="shak")
 
 
+@with_xarray
+def test_named_values_keep_the_order_of_the_sweep_in_a_dataset() -> None:
+    values = [{"friction": name, "seed": seed} for name in ("low", "high", "gone") for seed in (2, 1)]
+    found = dataset_of(table_of(6), values)
+    assert found["friction"].values.tolist() == ["low", "high", "gone"]
+    assert found["seed"].values.tolist() == [1, 2]
+    assert found[PHI].sel(friction="high", seed=1) == pytest.approx(0.3)
+    assert found["run"].sel(friction="gone", seed=2) == "r4"
+
+
+@with_xarray
+@pytest.mark.parametrize("wrong", [9, -1, 1.5, True, None])
+def test_a_dataset_is_of_the_phase_with_a_number(swept: smarticles.SweepDirectory, wrong: Any) -> None:
+    phi = "phi second-highest-com [-]"
+    assert swept.to_xarray(phase=2)[phi].sel(aspect_ratio=0.7, seed=1) == pytest.approx(0.2 * 1.002)
+    with pytest.raises(smarticles.InputError, match=r"^phase: no run has frames of phase .*; known: 0, 1, 2, 3$"):
+        swept.to_xarray(phase=wrong)
+
+
 def test_without_xarray_the_message_says_how_to_get_it(
     swept: smarticles.SweepDirectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,8 +2,9 @@
 
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_cases import WriteRun
@@ -86,6 +87,28 @@ def test_a_table_of_a_sweep_has_what_it_varies(swept: smarticles.SweepDirectory)
     assert list(table.columns[:3]) == ["run", "aspect_ratio", "seed"]
     assert list(table.columns).count("seed") == 1
     assert table["aspect_ratio"].tolist() == [0.4] * 8 + [0.7] * 8
+
+
+def test_a_sweep_is_measured_like_its_directory(swept: smarticles.SweepDirectory) -> None:
+    assert smarticles.measure(swept).equals(smarticles.measure(swept.path))
+    assert smarticles.read(swept[0]).path == swept[0].path
+
+
+@pytest.mark.parametrize("given", [None, 3, [], {"seed": 1}])
+def test_what_is_no_directory_is_rejected(given: Any) -> None:
+    scene = scene_of(engine="links")
+    takers: list[Callable[[], object]] = [
+        lambda: smarticles.read(given),
+        lambda: smarticles.read_sweep(given),
+        lambda: smarticles.measure(given),
+        lambda: smarticles.plot(given),
+        lambda: smarticles.plot(given, "com_height_m"),
+        lambda: smarticles.run(scene, given),
+        lambda: smarticles.sweep(scene, given, vary={"seed": [1]}),
+    ]
+    for take in takers:
+        with pytest.raises(smarticles.InputError, match=r"^(directory|run|out): .* is no directory; give its path"):
+            take()
 
 
 def test_a_sweep_is_shown_in_one_line(swept: smarticles.SweepDirectory) -> None:
@@ -214,9 +237,10 @@ def test_a_wrong_scene_is_an_input_error_in_one_line() -> None:
     ({"contact.frctn": [1]}, "vary: run frctn1: contact: unknown key 'frctn'"),
     ({"phases.7.duration_s": [1]}, "scene: phases.7.duration_s: there is no '7' in the scene"),
     ({"seed": [1, 1]}, "vary: repeats.seeds: a seed is given twice"),
+    ({1: [2]}, "vary: 1 is no text; give a key of the scene, e.g. 'seed'"),
 ])  # fmt: skip
 def test_errors_of_a_sweep_name_arguments_and_no_temporary_file(
-    tmp_path: Path, vary: dict[str, list[int]], message: str
+    tmp_path: Path, vary: dict[Any, list[int]], message: str
 ) -> None:
     with pytest.raises(smarticles.InputError) as raised:
         smarticles.sweep(scene_of(), tmp_path / "out", vary=vary)
@@ -236,6 +260,15 @@ def test_a_run_takes_the_keys_of_a_scene(tmp_path: Path) -> None:
     with pytest.raises(smarticles.InputError, match=r"vary: run count0: count: 0 is out of range"):
         smarticles.sweep(keys, tmp_path / "b", zip={"count": [0]})
     assert not (tmp_path / "b").exists()
+
+
+@pytest.mark.parametrize("progress", [True, False])
+def test_a_sweep_shows_its_progress_unless_it_is_turned_off(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], progress: bool
+) -> None:
+    keys = {"seed": 1, "count": 1, "fidelity": "draft", "phases": [{"type": "deposit"}]}
+    assert len(smarticles.sweep(keys, tmp_path / "a", vary={"count": [1]}, progress=progress)) == 1
+    assert ("count1" in "".join(capfd.readouterr())) == progress
 
 
 def test_warnings_of_a_run_are_warnings_of_python(tmp_path: Path) -> None:

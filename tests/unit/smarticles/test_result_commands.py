@@ -160,6 +160,21 @@ def test_the_legend_is_about_columns_that_are_printed(
     assert "of a pour" not in smarticles("measure", run, "--phase", "shake").out
 
 
+def test_a_phase_without_frames_is_named(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+    runs = [write_run(tmp_path / name, frames_per_phase=1) for name in ("a", "b", "whole")]
+    for run in runs[:2]:
+        listed = (run / "frames.pvd").read_text(encoding="utf-8").splitlines(keepends=True)
+        kept = [line for line in listed if "frame_000001" not in line]
+        (run / "frames.pvd").write_text("".join(kept), encoding="utf-8")
+    said = smarticles("measure", *runs)
+    note = f"note: {runs[0]} and 1 more: phase 1 (relax) ended before a frame was due, and has no row; lower"
+    assert [line for line in said.out.splitlines() if line.startswith("note:")] == [
+        f"{note} recording.frame_interval_s"
+    ]
+    assert note in smarticles("measure", *runs, "--by", "seed").out
+    assert "note:" not in smarticles("measure", runs[2]).out
+
+
 def test_measure_keeps_the_tables_of_runs_that_have_not_changed(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles, monkeypatch: pytest.MonkeyPatch
 ) -> None:

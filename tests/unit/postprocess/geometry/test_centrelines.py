@@ -57,6 +57,7 @@ def test_units_are_those_of_the_coordinates_in_any_spelling(tmp_path, header, un
         (CSV.replace(" [mm]", ""), None, "states no unit of length; give unit='mm', or another one of m, cm, mm, um"),
         (CSV, "cm", "states mm as unit of its columns x, y, z, unit is cm; give one unit"),
         (CSV, "inch", "unit 'inch' is unknown; known: m, cm"),
+        (CSV, 1e-3, "unit 0.001 is unknown; known: m, cm"),
         (CSV.replace("body", "particle"), None, "it has no column body; a CSV file needs columns body, x, y, z"),
         (CSV.replace("5, 0, 0, 9", "5, 0, 0, x"), None, "a value is no number"),
         (CSV.replace("5, 0, 0, 9", "5, 0, , 9"), None, "line 4 needs three finite coordinates"),
@@ -283,3 +284,9 @@ def test_grids_with_other_cells_and_damaged_files_are_rejected(tmp_path, capfd):
     with pytest.raises(InputError, match=r"d\.vtk: it holds no lines"):
         read_centrelines(tmp_path / "d.vtk", unit="m")
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("given", [None, 3, np.zeros((2, 3))])
+def test_what_is_no_file_is_rejected(given):
+    with pytest.raises(InputError, match=r"^centre lines: .* is no file; give its path; of a frame, use segments_of"):
+        read_centrelines(given)

@@ -47,6 +47,13 @@ def test_frames_of_a_run_bring_their_times(make_run):
     assert found.total_m2 == pytest.approx([0, (1 + 4) / 2 * 1e-6, 9e-6])
 
 
+def test_what_is_neither_frames_nor_positions_is_rejected(make_run):
+    frames = read_frames(make_run([(0, 0.0), (0, 0.0)]))
+    for given in (frames[0], list(frames), "runs/a"):
+        with pytest.raises(InputError, match=r"^positions: .* is no array of numbers; give frames of a run"):
+            mean_squared_displacement(given)
+
+
 @pytest.mark.parametrize(
     ("times", "words"),
     [

@@ -41,6 +41,22 @@ def test_a_dict_fills_columns_with_its_own_names_and_units(make_run):
     assert row["seen [-]"] == 1
 
 
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [
+        ("pressure_Pa", "pressure [Pa]"),
+        ("inertia_kg_m2", "inertia [kg m²]"),
+        ("speed_mm_per_s", "speed [mm/s]"),
+        ("area_mm2", "area [mm²]"),
+        ("taps_per_s", "taps [1/s]"),
+        ("stiffness_N_m_per_rad", "stiffness [N m/rad]"),
+        ("phi", "phi [-]"),
+    ],
+)
+def test_the_end_of_a_name_is_the_unit_of_its_column(make_run, name, column):
+    assert column in table_of(make_run(), lambda _frame, _run: {name: 1.0})
+
+
 def test_a_number_fills_one_column_which_is_nan_where_it_is_undefined(make_run):
     def mean_speed_m_per_s(frame, _run):
         if frame.count < 2:

@@ -62,6 +62,9 @@ def test_a_cubic_lattice_has_its_neighbours_at_their_distances():
         ({"top": np.inf}, ["no finite volume", "give a radius"]),
         ({"longest": 0.0}, ["longest distance", "0.0 m"]),
         ({"bins": 0}, ["0 bins"]),
+        ({"bins": 2.5}, ["a whole number of bins", "2.5 bins"]),
+        ({"bins": [0.1, 0.2]}, ["[0.1, 0.2] bins"]),
+        ({"longest": "20 mm"}, ["longest distance", "'20 mm' m"]),
     ],
 )
 def test_wrong_regions_and_shells_are_rejected(keywords, words):
@@ -69,6 +72,8 @@ def test_wrong_regions_and_shells_are_rejected(keywords, words):
     with pytest.raises(InputError) as error:
         radial_distribution(points, **({"longest": 1.0} | keywords))
     assert all(word in str(error.value) for word in words), error.value
+    with pytest.raises(InputError, match=r"^centres: .* is no array of numbers; give those of one frame"):
+        radial_distribution(object(), longest=1.0)
     with pytest.raises(InputError, match="body 3 is not"):
         radial_distribution(np.where(np.arange(30)[:, None] == 3, np.nan, points), longest=1.0)
 
