@@ -96,6 +96,11 @@ def test_file_that_is_no_yaml(tmp_path: Path) -> None:
             "phases.3.duration_s=1",
             "--set phases.3.duration_s=1: there is no '3' in the scene; lists are numbered from 0",
         ),
+        (
+            "phases.duration_s=1",
+            "--set phases.duration_s=1: there is no 'duration_s' in the scene; lists are numbered from 0, "
+            "as in phases.0.duration_s",
+        ),
         ("count.x=1", "--set count.x=1: there is no 'x' in the scene; lists are numbered from 0"),
         ("seed=[1", "--set seed=[1: the value is not valid YAML"),
         ("count=4O", "--set count=4O: count: got the text '4O', expected a number; write it in digits"),
