@@ -67,7 +67,7 @@ def test_parts_of_a_scene_are_values_with_names(tmp_path: Path) -> None:
 def test_the_only_particle_needs_no_number(tmp_path: Path) -> None:
     rods = Scene(seed=1, count=5, fidelity="draft", phases=[{"type": "deposit"}], particle=ROD)
     found = points(tmp_path, {"particle.length_m": [0.01, 0.015]}, scene=rods)
-    assert [point.scene.particle[0].length_m for point in found] == [0.01, 0.015]
+    assert [point.scene.model_dump()["particle"][0]["length_m"] for point in found] == [0.01, 0.015]
     two = Scene(seed=1, count=6, fidelity="draft", phases=[{"type": "deposit"}], particle=[ROD, RING])
     with pytest.raises(InputError, match=r"as in particle\.0\.length_m"):
         points(tmp_path, {"particle.length_m": [0.01, 0.015]}, scene=two)
