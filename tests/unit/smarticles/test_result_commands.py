@@ -269,6 +269,17 @@ def test_places_that_are_neither_run_nor_sweep(command: str, tmp_path: Path, sma
         assert "; give the directory of a run" in said.err
 
 
+@pytest.mark.parametrize("command", ["render", "measure", "status", "resume"])
+def test_a_directory_that_holds_runs_names_one(
+    command: str, tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    for name in "ba":
+        write_run(tmp_path / "runs" / name)
+    said = smarticles(command, tmp_path / "runs")
+    assert said.status == 2
+    assert said.err.endswith(f"; give a run that it holds, such as {tmp_path / 'runs' / 'a'}\n")
+
+
 def test_render_draws_a_film_of_a_part_in_fixed_colours(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
