@@ -121,7 +121,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     print(_text(table, by, shown))
     poured = bool((table["phase type"] == POUR).any())
     print(_legend({column for _, column, _, _ in shown}, per_frame=arguments.frames, by=by, poured=poured))
-    for note in _notes(table) if runs is None else _left_out(runs, unfinished=arguments.unfinished):
+    notes = _notes(table) if runs is None else _left_out(runs, unfinished=arguments.unfinished)
+    for note in [*_without_values(table, arguments.also), *notes]:
         print(f"note: {note}")
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
@@ -234,6 +235,18 @@ def _notes(table: pd.DataFrame) -> list[str]:
                 f"{where}: force_limit_N stopped the hook after {height_mm:.3g} mm; the peak force is a lower bound"
             )
     return notes
+
+
+def _without_values(table: pd.DataFrame, also: Collection[str]) -> list[str]:
+    """Return a note for each measure of `also` that does not apply to any run of the table."""
+    from postprocess.measures.registry import registered  # noqa: PLC0415
+
+    columns_of = {m.name: [quantity.header for quantity in m.quantities] for m in registered() if m.name in also}
+    return [
+        f"--also {name}: this measure does not apply to these runs"
+        for name, headers in columns_of.items()
+        if not any(header in table.columns and table[header].notna().any() for header in headers)
+    ]
 
 
 def _left_out(runs: pd.DataFrame, *, unfinished: bool) -> list[str]:

@@ -84,6 +84,9 @@ def test_measure_adds_measures_on_request_alone(tmp_path: Path, write_run: Write
     (row,) = (line for line in said.out.splitlines() if line.startswith("shake"))
     assert said.out.split("\n")[0].split("  ")[-1] == "mouths upwards"
     assert float(row.split()[-1]) == pytest.approx(more["mouths upwards [-]"], abs=0.1)
+    caged = smarticles("measure", run, "--also", "caging").out  # not on the engine of this run
+    assert "note: --also caging: this measure does not apply to these runs" in caged
+    assert "does not apply" not in said.out
     unknown = smarticles("measure", run, "--also", "caging,crossing")
     assert unknown.status == 2
     assert "also: there is no measure 'crossing' to add; did you mean 'crossing-number'?" in unknown.err
