@@ -75,7 +75,7 @@ _TEXTS = {
     "dict_type": "{shown} is not keys and values; write them as {{key: value}}",
     "model_type": "{shown} is not keys and values; write them as {{key: value}}",
     "model_attributes_type": "{shown} is not keys and values; write them as {{{tag_key}: …}}",
-    "union_tag_not_found": "{tag_key}: missing in {shown}; write which one it is, see `smarticles schema`",
+    "union_tag_not_found": "{tag_key}: missing in {shown}; write which one it is, see `smarticles keys`",
     "union_tag_invalid": "{tag_key}: {shown_tag} is not known; {choice}",
 }
 """Message for each of pydantic's types of error; `_text` fills in the fields in braces."""
