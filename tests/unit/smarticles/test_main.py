@@ -218,7 +218,7 @@ def test_columns_of_numbers_are_aligned_to_the_right() -> None:
 
 
 def test_a_standard_error_stays_beside_its_value_on_a_narrow_screen(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("smarticles.command_line.screen_width", lambda: 24)
+    monkeypatch.setattr("smarticles.command_line.screen_width", lambda: 26)
     header = ["run", "phi", "± SE", "height", "± SE", "n"]
     blocks = column_blocks(header, [["a", 0.125, 0.001, 0.25, 0.002, 3]])
     assert [block[0].split() for block in blocks] == [["run", "phi", "±", "SE"], ["run", "height", "±", "SE", "n"]]
