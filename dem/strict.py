@@ -75,7 +75,7 @@ _TEXTS = {
     "dict_type": "{shown} is not keys and values; write them as {{key: value}}",
     "model_type": "{shown} is not keys and values; write them as {{key: value}}",
     "model_attributes_type": "{shown} is not keys and values; write them as {{{tag_key}: …}}",
-    "union_tag_not_found": "{tag_key}: missing in {shown}; write which one it is, see `smarticles schema`",
+    "union_tag_not_found": "{tag_key}: missing in {shown}; write which one it is, see `smarticles keys`",
     "union_tag_invalid": "{tag_key}: {shown_tag} is not known; {choice}",
 }
 """Message for each of pydantic's types of error; `_text` fills in the fields in braces."""
@@ -111,22 +111,23 @@ class Strict(BaseModel):
                 if isinstance(item, bool) and annotation not in (bool, Any):
                     raise ValueError(f"{key}: got the boolean {str(item).lower()}, expected {_kind(annotation)}")
                 if isinstance(item, str) and _kind(annotation) == "a number":
-                    raise ValueError(f"{key}: got the text {shown(item)}, expected a number; {_as_a_number(item)}")
+                    raise ValueError(f"{key}: got the text {shown(item)}, expected a number; {_as_a_number(item, key)}")
         for key in data:
             if key not in known:
                 raise ValueError(f"unknown key {shown(key)}; {cls.nearest_key(str(key))}")
         return data
 
 
-def _as_a_number(text: str) -> str:
-    """Return advice about text in the place of a number."""
+def _as_a_number(text: str, key: str) -> str:
+    """Return advice about text in the place of the number of a key."""
     try:
         return "leave out the quotes" if math.isfinite(float(text)) else "write a finite one"
     except ValueError:
         pass
     if _WITH_COMMA.fullmatch(text):
         return f"write {text.strip().replace(',', '.')}, with a point"
-    return "leave out the unit, which the key names" if _WITH_UNIT.fullmatch(text) else "write it in digits"
+    has_unit = unit_of(key)[1] and _WITH_UNIT.fullmatch(text)
+    return "leave out the unit, which the key names" if has_unit else "write it in digits"
 
 
 def _kind(annotation: Any) -> str:

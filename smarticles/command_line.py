@@ -190,6 +190,7 @@ def reject_existing(option: str, path: Path | None, *, overwrite: bool) -> None:
 
 
 _LEAST_TEXT = 24  # characters that a column of text must have on the screen to be broken into lines
+_OF_THE_COLUMN_BEFORE = ("± SE", "n")  #: Headings of columns that are about the column to their left
 
 
 class Cell(str):
@@ -233,17 +234,26 @@ def column_blocks(header: Sequence[str], rows: Sequence[Sequence[object]], *, ke
         return text[:before_last] + f"\n{' ' * before_last}".join(lines)
 
     every = list(range(len(header)))
-    blocks = [every] if screen is None or folds else _blocks(widths, keys, screen)
+    blocks = [every] if screen is None or folds else _blocks(header, widths, keys, screen)
     return [[line(texts, shown) for texts in [list(header), *cells]] for shown in blocks]
 
 
-def _blocks(widths: Sequence[int], keys: int, screen: int) -> list[list[int]]:
-    """Divide columns of these widths into blocks that fit a screen; each begins with the first `keys` columns."""
-    blocks = [list(range(keys))]
+def _blocks(header: Sequence[str], widths: Sequence[int], keys: int, screen: int) -> list[list[int]]:
+    """Divide columns of these widths into blocks that fit a screen; each begins with the first `keys` columns.
+
+    Columns of `_OF_THE_COLUMN_BEFORE` stay in the block of the column to their left.
+    """
+    groups: list[list[int]] = []
     for k in range(keys, len(widths)):
-        if len(blocks[-1]) > keys and sum(widths[j] + 2 for j in blocks[-1]) + widths[k] > screen:
+        if groups and header[k] in _OF_THE_COLUMN_BEFORE:
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    blocks = [list(range(keys))]
+    for group in groups:
+        if len(blocks[-1]) > keys and sum(widths[k] + 2 for k in [*blocks[-1], *group]) - 2 > screen:
             blocks.append(list(range(keys)))
-        blocks[-1].append(k)
+        blocks[-1] += group
     return blocks
 
 

@@ -224,8 +224,10 @@ def as_cell(value: Any) -> Any:
 def of_phase(table: pd.DataFrame, phase: str | int) -> pd.DataFrame:
     """Select rows of a table of `measured` by type or number of phase; "last" selects the last phase of each run.
 
-    InputError if no run has such a phase.
+    InputError if no run has such a phase, or none of them has a frame.
     """
+    from dem.record.run import Run  # noqa: PLC0415
+
     if not isinstance(phase, str):
         chosen = table["phase"] == phase
         if isinstance(phase, bool) or not chosen.any():
@@ -235,7 +237,12 @@ def of_phase(table: pd.DataFrame, phase: str | int) -> pd.DataFrame:
     if phase == "last":
         return table[table["phase"] == table.groupby("run")["phase"].transform("max")].reset_index(drop=True)
     if not (table["phase type"] == phase).any():
-        raise InputError(f"no run has a phase {phase!r}; {nearest(phase, [*table['phase type'].unique(), 'last'])}")
+        measured_types = [*table["phase type"].unique(), "last"]
+        if any(one.type == phase for run in table["run"].unique() for one in Run(Path(run)).phases):
+            raise InputError(
+                f"no frame lies in a phase of this type, so that it has no measures; known: {', '.join(measured_types)}"
+            )
+        raise InputError(f"no run has a phase {phase!r}; {nearest(phase, measured_types)}")
     return table[table["phase type"] == phase].reset_index(drop=True)
 
 

@@ -234,6 +234,12 @@ class ForceSequence:
         return read_forces(self.frames[index])
 
 
+def runs_within(path: Path) -> str:
+    """Return advice to give a run that a directory holds, one level below; empty if there is none."""
+    found = min((file.parent for file in path.glob(f"*/{MANIFEST}")), default=None)
+    return f"give a run that it holds, such as {found}" if found else ""
+
+
 def _reject_place(path: Path) -> NoReturn:
     """Raise InputError about a path that is no run directory; the message states what the path is."""
     remedy = REMEDY
@@ -244,7 +250,7 @@ def _reject_place(path: Path) -> NoReturn:
     elif (path / OF_SWEEP).is_file():
         cause, remedy = "it is a sweep", f"give one of its runs, {path / 'runs' / 'NAME'}"
     else:
-        cause = f"it holds no {MANIFEST}"
+        cause, remedy = f"it holds no {MANIFEST}", runs_within(path) or REMEDY
     cannot_read("run directory", path, cause, remedy)
 
 

@@ -56,12 +56,12 @@ def parse_scene(data: Any, *, source: str, folder: Path | None = None) -> Scene:
     try:
         return Scene.model_validate(data, context={"folder": folder})
     except ValidationError as error:
-        raise InputError(f"{source}: {explained(error, data, described='`smarticles schema`')}") from None
+        raise InputError(f"{source}: {explained(error, data, described='`smarticles keys`')}") from None
 
 
 def _not_a_scene(data: Any) -> str | None:
     if data is None:
-        return "is empty; a scene is a mapping of keys to values, see `smarticles schema`"
+        return "is empty; a scene is a mapping of keys to values, see `smarticles keys`"
     if not isinstance(data, Mapping):
         return f"a scene is a mapping of keys to values, got {shown(data)}"
     if "template" in data and "points" in data:

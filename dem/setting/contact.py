@@ -65,5 +65,7 @@ def with_preset(data: Any, folder: Path | None) -> Any:
     try:
         Contact.model_validate(values)
     except ValidationError as error:
-        raise ValueError(f"{where}: {file}: {explained(error, values, described='`smarticles schema`')}") from None
+        raise ValueError(
+            f"{where}: {file}: {explained(error, values, described='`smarticles keys contact`')}"
+        ) from None
     return {**data, "contact": {**values, **{key: value for key, value in contact.items() if key != PRESET}}}

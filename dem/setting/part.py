@@ -32,27 +32,38 @@ class Part(Strict):
     @classmethod
     def nearest_key(cls, key: str) -> str:
         """Return advice about an unknown key: use a key of similar spelling, or move it to another part."""
-        # Most often the unit, or the second half of a name, was left out.
+        # Most often the unit, or one half of a name, was left out.
         known = cls.known_keys()
-        similar = [name for name in known if name.startswith(f"{key}_")]
+        similar = [name for name in known if name.startswith(f"{key}_") or name.endswith(f"_{key}")]
         similar = similar or difflib.get_close_matches(key, known, n=1, cutoff=0.7)
         if similar:
             return f"did you mean {' or '.join(map(repr, similar))}?"
         if key in _BEYOND:
             return f"scenes have no {_BEYOND[key]}; docs/limits.md lists what the project cannot do and what there is"
-        for part in Part.__subclasses__():
-            if part.__subclasses__() or ("type" in part.model_fields and "type" in cls.model_fields):
-                continue  # a key of one phase does not belong in another phase; base classes are no part of a file
+        # A key of one phase does not belong in another phase.
+        others = [part for part in _parts() if not ("type" in part.model_fields and "type" in cls.model_fields)]
+        owners = [
+            "particle" if "shape" in part.model_fields else part.tag() for part in others if key in part.known_keys()
+        ]
+        if owners:
+            return f"it belongs in {' or '.join(dict.fromkeys(owners))}"
+        known_here = "known keys: " + ", ".join(known)
+        for part in others:
             elsewhere = difflib.get_close_matches(key, part.known_keys(), n=1, cutoff=0.65)
             if elsewhere:
-                return f"{elsewhere[0]!r} belongs in {part.tag()}"
-        return "known keys: " + ", ".join(known)
+                return f"{known_here}; {elsewhere[0]!r} belongs in {part.tag()}"
+        return known_here
 
     @classmethod
     def tag(cls) -> str:
         """Return the name of this part in scene files: the value of its `type` or `shape`, or else its key."""
         kind = cls.model_fields.get("type") or cls.model_fields.get("shape")
         return str(get_args(kind.annotation)[0]) if kind else cls.__name__.lower()
+
+
+def _parts(base: type[Part] = Part) -> list[type[Part]]:
+    """Return the parts of scene files: all classes below `base` that are no base themselves."""
+    return [part for below in base.__subclasses__() for part in (_parts(below) or [below])]
 
 
 def as_list(value: Any) -> Any:

@@ -82,6 +82,20 @@ def packing_profile(
     return profile
 
 
+def reject_without_profile(run: Run) -> None:
+    """Raise InputError if a run has no φ(r, z): it needs smarticles in one upright cylinder."""
+    why = None
+    if run.manifest.kinds is not None:
+        shapes = ", ".join(sorted({kind.shape for kind in run.manifest.kinds}))
+        why = f"needs smarticles: the bodies of this run are of the shape {shapes}"
+    elif run.manifest.planar:
+        why = "needs one upright cylinder: this run moves in a plane"
+    elif run.manifest.container_tiers > 1:
+        why = f"needs one upright cylinder: this run has a container of {run.manifest.container_tiers} tiers"
+    if why is not None:
+        raise InputError(f"{run.path}: φ(r, z) {why}; leave out the profile")
+
+
 def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd.DataFrame:
     """Compute φ(r, z) for the last frame of every phase.
 
@@ -94,11 +108,9 @@ def profile_table(run: Run, *, rings: int = 6, layer: float | None = None) -> pd
         A table with one row per phase, ring and layer, and units in its column names.
 
     Raises:
-        InputError: The run is planar, its container has several tiers, or `rings` or `layer` are not above 0.
+        InputError: `reject_without_profile`, or `rings` or `layer` are not above 0.
     """
-    if run.manifest.planar or run.manifest.container_tiers > 1:
-        what = "moves in a plane" if run.manifest.planar else f"has a container of {run.manifest.container_tiers} tiers"
-        raise InputError(f"{run.path}: φ(r, z) needs one upright cylinder: this run {what}; leave out the profile")
+    reject_without_profile(run)
     frames = run.frames
     rows: list[dict[str, object]] = []
     for phase in run.phases:

@@ -25,6 +25,7 @@ from postprocess.geometry.links import UndefinedMeasureError
 
 ENTRY_POINTS = "smarticles.measures"  #: Group of the entry points by which installed packages add their `MEASURES`
 
+_LAST = 1000  #: Place of columns that no measure has placed
 _PACKAGE = __name__.rpartition(".")[0]
 
 
@@ -208,14 +209,19 @@ def _installed() -> Iterator[FrameMeasure | PhaseMeasure]:
             ) from error
 
 
-def shown_quantities() -> tuple[tuple[Quantity, Shown], ...]:
-    """Return the quantities of short tables with their format, in the order of the columns."""
-    found = [
-        (quantity, quantity.shown)
-        for measure in registered()
-        for quantity in measure.quantities
-        if quantity.shown is not None
-    ]
+def shown_quantities(also: Collection[str] = ()) -> tuple[tuple[Quantity, Shown], ...]:
+    """Return the quantities of short tables with their format, in the order of the columns.
+
+    The quantities of the measures named in `also` are all among them; those without a format come last.
+    """
+    found = []
+    for measure in registered():
+        for quantity in measure.quantities:
+            if quantity.shown is not None:
+                found.append((quantity, quantity.shown))
+            elif measure.name in also:
+                heading = quantity.label if quantity.unit == "-" else quantity.header
+                found.append((quantity, Shown(heading=heading, place=_LAST, form=".3g")))
     return tuple(sorted(found, key=lambda pair: pair[1].place))
 
 

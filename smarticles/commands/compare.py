@@ -108,7 +108,7 @@ def _measures(found: Sequence[Mapping[str, Any]]) -> str:
                 numbers = [Cell.of(row[number], shown.form, shown.factor) for number in _NUMBERS]
                 cells.append([*(row[key] for key in keys), shown.heading, *numbers])
     if not cells:
-        return "measures: no phase has frames in both"
+        return "measures: no phase has frames in both, at equal values of the variables that both have"
     return columns([*keys, "measure", "A", "B", "B - A", "± SE"], cells)
 
 
@@ -177,7 +177,12 @@ def _compare_sweeps(one: Folder, other: Folder) -> dict[str, Any]:
     begun = [[name for name, run in runs.items() if (run.path / MANIFEST).is_file()] for runs in (first, second)]
     both = [name for name in begun[0] if name in begun[1]]
     varied = [values_in(folder) for folder in (one, other)]
-    keys = [*(name for name in varied[0] if name != SEED and name in varied[1]), *PHASE]
+    shared = [name for name in varied[0] if name != SEED and name in varied[1]]
+    # A constant with one value in A and another in B is what is compared, and makes no groups.
+    differing = [
+        name for name in shared if varied[0][name] != varied[1][name] and max(len(v[name]) for v in varied) == 1
+    ]
+    keys = [*(name for name in shared if name not in differing), *PHASE]
     with progress_of("measuring") as progress:
         tables = [grouped(measured([folder.path], progress=progress), keys) for folder in (one, other)]
     return {

@@ -73,7 +73,7 @@ the run directories, so that runs which have not changed are not measured again.
         metavar="NAME,…",
         help="further measures, named in the description above; with --frames for every frame",
     )
-    profile_help = "write φ(r, z) at the end of each phase, in rings and layers of the container, as CSV"
+    profile_help = "write φ(r, z) of smarticles at the end of each phase, in rings and layers of the container, as CSV"
     measure.add_argument("--profile", type=Path, metavar="FILE.csv", help=profile_help)
     add_options(measure, "--jobs", help="number of processes; default: one per core, fewer where memory is short")
     add_options(measure, "--overwrite", "--json")
@@ -85,7 +85,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
 
     from dem.record.run import Run, open_run  # noqa: PLC0415
     from postprocess.measures.pile import POUR  # noqa: PLC0415
-    from postprocess.measures.profile import profile_table  # noqa: PLC0415
+    from postprocess.measures.profile import profile_table, reject_without_profile  # noqa: PLC0415
     from postprocess.report.tables import write_table  # noqa: PLC0415
 
     output: Path | None = arguments.table
@@ -96,6 +96,9 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         raise InputError(f"--profile {profile}: is the file of --table too; choose another name")
     by = _groups(arguments)
     directories = list(sources(arguments.directories))
+    if profile is not None:
+        for directory in directories:
+            reject_without_profile(Run(directory))
     for warning in filter(None, (open_run(directory).lost_series for directory in directories)):
         warn(warning)
     jobs = arguments.jobs or usual_jobs(arguments.directories)
@@ -103,17 +106,8 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         table = measured(
             arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=progress
         )
-    if arguments.phase is not None:
-        try:
-            table = of_phase(table, arguments.phase)
-        except InputError as error:
-            raise InputError(f"--phase {arguments.phase}: {error}") from None
     runs = states(arguments.directories) if by else None
-    if by:
-        try:
-            table = grouped(table, by, runs=runs, unfinished=arguments.unfinished)
-        except InputError as error:
-            raise InputError(f"--by {','.join(by)}: {error}") from None
+    table = _selected(table, arguments, by, runs)
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
     if profile is not None:
@@ -122,18 +116,32 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print(as_json(table.to_dict("records")))
         return 0
-    shown = _shown(table, per_frame=arguments.frames)
+    shown = _shown(table, per_frame=arguments.frames, also=arguments.also, errors=bool(by))
     print(_text(table, by, shown))
     poured = bool((table["phase type"] == POUR).any())
     print(_legend({column for _, column, _, _ in shown}, per_frame=arguments.frames, by=by, poured=poured))
     notes = _notes(table) if runs is None else _left_out(runs, unfinished=arguments.unfinished)
-    for note in [*notes, *_without_frames(directories)]:
+    for note in [*_without_values(table, arguments.also), *notes, *_without_frames(directories)]:
         print(f"note: {note}")
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
     if profile is not None:
         print(f"{profile}: φ(r, z), {len(rings)} rows")
     return 0
+
+
+def _selected(
+    table: pd.DataFrame, arguments: argparse.Namespace, by: Sequence[str], runs: pd.DataFrame | None
+) -> pd.DataFrame:
+    """Return the rows of the phases of --phase, averaged over runs with --by."""
+    option = f"--phase {arguments.phase}"
+    try:
+        if arguments.phase is not None:
+            table = of_phase(table, arguments.phase)
+        option = f"--by {','.join(by)}"
+        return grouped(table, by, runs=runs, unfinished=arguments.unfinished) if by else table
+    except InputError as error:
+        raise InputError(f"{option}: {error}") from None
 
 
 def _groups(arguments: argparse.Namespace) -> Sequence[str]:
@@ -150,16 +158,21 @@ def _groups(arguments: argparse.Namespace) -> Sequence[str]:
     return by
 
 
-def _shown(table: pd.DataFrame, *, per_frame: bool) -> list[_Column]:
-    """Return the main columns of the table that have a value in at least one row."""
+def _shown(table: pd.DataFrame, *, per_frame: bool, also: Collection[str], errors: bool) -> list[_Column]:
+    """Return the main columns of the table that have a value in at least one row.
+
+    The columns of the measures `also` are among them. With `errors` each has its standard error beside it, unless
+    this is 0 in all rows.
+    """
     from postprocess.measures.registry import shown_quantities  # noqa: PLC0415
     from postprocess.statistics.points import counted, marked  # noqa: PLC0415
 
     wanted = list(_ALWAYS)
-    for quantity, shown in shown_quantities():
+    for quantity, shown in shown_quantities(also):
         wanted.append((shown.heading, quantity.header, shown.form, shown.factor))
-        if shown.with_error:
-            wanted.append(("± SE", marked(quantity.header, "SE"), shown.form, shown.factor))
+        error = marked(quantity.header, "SE")
+        if shown.with_error or (errors and error in table.columns and (table[error] > 0).any()):
+            wanted.append(("± SE", error, shown.form, shown.factor))
         wanted.append(("n", counted(quantity.header), ".0f", 1.0))
     wanted += _PER_FRAME if per_frame else ()
     return [entry for entry in wanted if entry[1] in table.columns and table[entry[1]].notna().any()]
@@ -243,6 +256,18 @@ def _without_frames(directories: Sequence[Path]) -> list[str]:
     ]
 
 
+def _without_values(table: pd.DataFrame, also: Collection[str]) -> list[str]:
+    """Return a note for each measure of `also` that does not apply to any run of the table."""
+    from postprocess.measures.registry import registered  # noqa: PLC0415
+
+    columns_of = {m.name: [quantity.header for quantity in m.quantities] for m in registered() if m.name in also}
+    return [
+        f"--also {name}: this measure does not apply to these runs"
+        for name, headers in columns_of.items()
+        if not any(header in table.columns and table[header].notna().any() for header in headers)
+    ]
+
+
 def _left_out(runs: pd.DataFrame, *, unfinished: bool) -> list[str]:
     """Return a note on unfinished runs of a table of `states`; none if all runs are finished."""
     done = int((runs[STATE] == DONE).sum())
@@ -265,9 +290,11 @@ def _legend(shown: Collection[str], *, per_frame: bool, by: Sequence[str], poure
     from postprocess.measures.table import LAST_FRAMES  # noqa: PLC0415
     from postprocess.statistics.points import counted  # noqa: PLC0415
 
-    averaged = f"means over the last {LAST_FRAMES} frames of each phase; SE: standard error of the mean"
+    averaged, error = f"means over the last {LAST_FRAMES} frames of each phase", "of the mean"
     if by:
-        averaged = f"means over runs and over the last {LAST_FRAMES} frames of each; SE: standard error over runs"
+        averaged, error = f"means over runs and over the last {LAST_FRAMES} frames of each", "over runs"
+    if any(column.rpartition(" [")[0].endswith(" SE") for column in shown):
+        averaged += f"; SE: standard error {error}"
     if poured and not per_frame:
         averaged += "; of a pour, frames of the settled pile alone"
     lines = ["one row per frame" if per_frame else averaged]

@@ -90,6 +90,12 @@ def print_keys(arguments: argparse.Namespace) -> int:
         )
         return 0
     if arguments.name not in known:
+        if arguments.name in schema["properties"]:
+            raise InputError(f"keys {arguments.name}: has no keys of its own; `smarticles keys` describes it")
+        owners = [name for name, definition in parts if arguments.name in definition.get("properties", {})]
+        if owners:
+            of = " and ".join(dict.fromkeys(owners))
+            raise InputError(f"keys {arguments.name}: is a key of {of}; see `smarticles keys {owners[0]}`")
         raise InputError(f"keys {arguments.name}: is no part of a scene; {nearest(arguments.name, known)}")
     # Several parts may have one name: `motor` is a key of scenes, and a law of joints.
     found = [definition for name, definition in parts if name == arguments.name]

@@ -183,22 +183,17 @@ def _watch(directories: Sequence[Path], interval: float) -> None:
 
 
 def _table(runs: Sequence[RunStatus]) -> str:
-    """Return a table with one row per run; columns `job` and `checkpoint s` only if a run has a value."""
-    any_ended_early = any(run.state in _ENDED_EARLY for run in runs)
-    any_job = any(run.job for run in runs)
-    header = ["run", "state", *(["job"] if any_job else []), "phase", "simulated s"]
-    header += [*(["checkpoint s"] if any_ended_early else []), "wall s", "cause"]
-    rows = [
-        [
-            run.name,
-            run.state,
-            *([run.job or ""] if any_job else []),
-            run.phase or "",
-            run.time_s,
-            *([run.checkpoint_s if run.state in _ENDED_EARLY else None] if any_ended_early else []),
-            run.wall_s,
-            run.cause or "",
-        ]
-        for run in runs
-    ]
-    return columns(header, rows)
+    """Return a table with one row per run; only columns in which a run has a value."""
+    early = [run.checkpoint_s if run.state in _ENDED_EARLY else None for run in runs]
+    every: dict[str, Sequence[object]] = {
+        "run": [run.name for run in runs],
+        "state": [run.state for run in runs],
+        "job": [run.job or "" for run in runs],
+        "phase": [run.phase or "" for run in runs],
+        "simulated s": [run.time_s for run in runs],
+        "checkpoint s": early,
+        "wall s": [run.wall_s for run in runs],
+        "cause": [run.cause or "" for run in runs],
+    }
+    shown = {name: cells for name, cells in every.items() if any(cell not in (None, "") for cell in cells)}
+    return columns(list(shown), list(zip(*shown.values(), strict=True)))

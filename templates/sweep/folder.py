@@ -19,7 +19,7 @@ from dem.record.document import Document
 from dem.record.files import write_text
 from dem.record.names import MANIFEST as RUN
 from dem.record.names import OF_SWEEP as MANIFEST
-from dem.record.run import Run, Status
+from dem.record.run import Run, Status, runs_within
 from dem.record.rundir import acquired
 from dem.scene.reading import dump_scene
 from templates.sweep.expand import Point
@@ -260,4 +260,4 @@ def open_folder(path: Path) -> Folder:
     what = f"holds neither a run ({RUN}) nor a sweep ({MANIFEST})" if path.is_dir() else "is a file"
     if not path.exists():
         what = "there is no such directory"
-    raise InputError(f"{path}: {what}; give the directory of a run, a sweep or a study")
+    raise InputError(f"{path}: {what}; {runs_within(path) or 'give the directory of a run, a sweep or a study'}")

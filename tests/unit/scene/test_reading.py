@@ -96,8 +96,20 @@ def test_file_that_is_no_yaml(tmp_path: Path) -> None:
             "phases.3.duration_s=1",
             "--set phases.3.duration_s=1: there is no '3' in the scene; lists are numbered from 0",
         ),
+        (
+            "phases.duration_s=1",
+            "--set phases.duration_s=1: there is no 'duration_s' in the scene; lists are numbered from 0, "
+            "as in phases.0.duration_s",
+        ),
         ("count.x=1", "--set count.x=1: there is no 'x' in the scene; lists are numbered from 0"),
         ("seed=[1", "--set seed=[1: the value is not valid YAML"),
+        ("count=4O", "--set count=4O: count: got the text '4O', expected a number; write it in digits"),
+        ("length_m=1", "--set length_m=1: unknown key 'length_m'; it belongs in hooks or particle"),
+        ("phases.0.to_height_m=1", "--set phases.0.to_height_m=1: phases.0: unknown key 'to_height_m'; known keys: "),
+        (
+            "smarticle.length_m=1",
+            "--set smarticle.length_m=1: smarticle: unknown key 'length_m'; did you mean 'middle_length_m'?",
+        ),
         ("smarticle.w=1", "--set smarticle.w=1: smarticle: unknown key 'w'; known keys: "),
         (
             "gravity_m_per_s2=yes",

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from command_cases import Smarticles, WriteRun
+from command_cases import SCENE, Smarticles, WriteRun
 
 PHI = "phi second-highest-com [-]"
 
@@ -91,6 +91,23 @@ def test_sweeps_are_compared_run_by_run_and_group_by_group(
     assert "identical bits: 1 of 2 runs that both sweeps have" in lines
     assert any(line.startswith("6 shake φ 0.1200 0.1400 0.0200") for line in lines)
     assert any(line.startswith("5 shake φ 0.1300 0.1300 0.0000") for line in lines)
+
+
+def test_sweeps_with_different_constants_are_compared_at_equal_variables(
+    tmp_path: Path, sweep_file: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    text = sweep_file.read_text()
+    for name, friction in (("a", 0.1), ("b", 0.2)):
+        sweep_file.write_text(f"{text}constants: {{friction: {friction}}}\n")
+        template = tmp_path / "scene.yaml.j2"
+        template.write_text(SCENE + "contact: {friction_wall: {{ friction }}}\n")
+        smarticles("sweep", sweep_file, "--out", tmp_path / name)
+        for count in (5, 6):
+            write_run(tmp_path / name / "runs" / f"n{count}", count=count)
+    found = json.loads(smarticles("compare", tmp_path / "a", tmp_path / "b", "--json").out)
+    assert {row["count"] for row in found["measures"]} == {5, 6}
+    assert "friction" not in found["measures"][0]
+    assert found["scene"]["friction"] == [0.1, 0.2]
 
 
 def test_a_sweep_with_a_run_that_has_not_begun_is_not_identical(

@@ -11,7 +11,7 @@ import pytest
 from command_cases import Smarticles
 
 from dem.errors import InputError, RunError
-from smarticles.command_line import Cell, columns
+from smarticles.command_line import Cell, column_blocks, columns
 from smarticles.main import build_parser, guarded, orderly_stop
 
 COMMANDS = build_parser()[1].parsers
@@ -215,3 +215,10 @@ def test_columns_of_numbers_are_aligned_to_the_right() -> None:
     text = columns(["name", "value", "note"], [["a", 1.23456, "x y"], ["long", None, ""], ["b", float("nan"), ""]])
     assert text.splitlines() == ["name  value  note", "a     1.235  x y", "long      -", "b         -"]
     assert columns(["φ"], [[Cell("0.10")], [Cell("-")]]).splitlines() == ["   φ", "0.10", "   -"]
+
+
+def test_a_standard_error_stays_beside_its_value_on_a_narrow_screen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("smarticles.command_line.screen_width", lambda: 26)
+    header = ["run", "phi", "± SE", "height", "± SE", "n"]
+    blocks = column_blocks(header, [["a", 0.125, 0.001, 0.25, 0.002, 3]])
+    assert [block[0].split() for block in blocks] == [["run", "phi", "±", "SE"], ["run", "height", "±", "SE", "n"]]

@@ -33,6 +33,20 @@ def test_measure_writes_a_profile_of_each_run_beside_the_table(
     assert (both.status, "is the file of --table too" in both.err) == (2, True)
 
 
+def test_a_profile_of_other_bodies_is_rejected_before_anything_is_measured(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a")
+    file = run / "run.json"
+    section = {"thickness_normal_m": 1e-3, "thickness_in_plane_m": 1e-3, "round": True, "sphere_diameter_m": 1e-3}
+    rod = {"shape": "rod", "bodies": 12, "bars": 1, "mass_kg": 1e-4, "volume_m3": 1e-8, "length_m": 0.015, **section}
+    file.write_text(json.dumps({**json.loads(file.read_text()), "kinds": [rod]}))
+    said = smarticles("measure", run, "--profile", tmp_path / "p.csv", "--table", tmp_path / "t.csv")
+    assert (said.status, said.out) == (2, "")
+    assert "needs smarticles: the bodies of this run are of the shape rod; leave out the profile" in said.err
+    assert not (tmp_path / "t.csv").exists()
+
+
 def test_measure_gives_json_without_nan(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
     run = write_run(tmp_path / "a")
     said = smarticles("measure", run, "--frames", "--json")
@@ -64,8 +78,15 @@ def test_measure_adds_measures_on_request_alone(tmp_path: Path, write_run: Write
         "linked graph largest share [-]",
     }
     assert more["average crossing number mean [-]"] > 0.1
-    said = smarticles("measure", run, "--also", "crossing-number")
+    said = smarticles("measure", run, "--also", "crossing-number,orientation")
     assert "⟨ACN⟩: average crossing number" in said.out
+    # What was asked for is printed too.
+    (row,) = (line for line in said.out.splitlines() if line.startswith("shake"))
+    assert said.out.split("\n")[0].split("  ")[-1] == "mouths upwards"
+    assert float(row.split()[-1]) == pytest.approx(more["mouths upwards [-]"], abs=0.1)
+    caged = smarticles("measure", run, "--also", "caging").out  # not on the engine of this run
+    assert "note: --also caging: this measure does not apply to these runs" in caged
+    assert "does not apply" not in said.out
     unknown = smarticles("measure", run, "--also", "caging,crossing")
     assert unknown.status == 2
     assert "also: there is no measure 'crossing' to add; did you mean 'crossing-number'?" in unknown.err
@@ -104,7 +125,8 @@ def test_measure_has_the_variables_of_a_sweep_and_means_by_them(
         ["a", "2", kind] for kind in ("deposit", "relax", "shake", "relax")
     ]
     # Of 0.12 and 0.14: their mean, and half their difference.
-    assert lines[3].split()[5:7] == ["0.1300", "0.0100"]
+    assert lines[3].split()[4:8] == ["5.5", "0.5", "0.1300", "0.0100"]
+    assert lines[0].count("± SE") > 4
     assert "standard error over runs" in said.out
     rest = smarticles("measure", out, "--by", "kind", "--by", "count", "--phase", "last").out.splitlines()
     assert [line.split()[:4] for line in rest[1:3]] == [["a", "5", "1", "relax"], ["a", "6", "1", "relax"]]
@@ -158,6 +180,23 @@ def test_the_legend_is_about_columns_that_are_printed(
     assert not any(word in out for word in ("φ", "voxel", "voronoi", "peak F/nW"))
     assert "of a pour" in out
     assert "of a pour" not in smarticles("measure", run, "--phase", "shake").out
+    assert "SE:" not in out
+    assert "SE:" in smarticles("measure", write_run(tmp_path / "b")).out
+
+
+def test_a_phase_without_a_frame_is_not_called_unknown(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    run = write_run(tmp_path / "a")
+    for name in ("run.json", "done.json"):
+        manifest = json.loads((run / name).read_text())
+        last = manifest["phases"][-1]
+        manifest["phases"].append({**last, "index": last["index"] + 1, "type": "release"})
+        (run / name).write_text(json.dumps(manifest))
+    said = smarticles("measure", run, "--phase", "release")
+    assert said.status == 2
+    assert "--phase release: no frame lies in a phase of this type" in said.err
+    assert "known: deposit, relax, shake, last" in said.err
 
 
 def test_a_phase_without_frames_is_named(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
@@ -246,6 +285,17 @@ def test_places_that_are_neither_run_nor_sweep(command: str, tmp_path: Path, sma
         assert said.status == 2
         assert stated in said.err
         assert "; give the directory of a run" in said.err
+
+
+@pytest.mark.parametrize("command", ["render", "measure", "status", "resume"])
+def test_a_directory_that_holds_runs_names_one(
+    command: str, tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
+    for name in "ba":
+        write_run(tmp_path / "runs" / name)
+    said = smarticles(command, tmp_path / "runs")
+    assert said.status == 2
+    assert said.err.endswith(f"; give a run that it holds, such as {tmp_path / 'runs' / 'a'}\n")
 
 
 def test_render_draws_a_film_of_a_part_in_fixed_colours(

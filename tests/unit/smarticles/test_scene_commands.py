@@ -120,3 +120,6 @@ def test_keys_are_printed_with_range_and_meaning(smarticles: Smarticles) -> None
         2,
         "smarticles: error: keys moter: is no part of a scene; did you mean 'motor'?\n",
     )
+    assert "keys count: has no keys of its own; `smarticles keys` describes it" in smarticles("keys", "count").err
+    of_part = smarticles("keys", "friction_wall")
+    assert (of_part.status, "is a key of contact; see `smarticles keys contact`" in of_part.err) == (2, True)

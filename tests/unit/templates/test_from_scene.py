@@ -64,6 +64,15 @@ def test_parts_of_a_scene_are_values_with_names(tmp_path: Path) -> None:
     assert [(p.name, p.scene.gravity_m_per_s2) for p in named] == [("moon_count4", 1.6), ("earth_count5", 9.81)]
 
 
+def test_the_only_particle_needs_no_number(tmp_path: Path) -> None:
+    rods = Scene(seed=1, count=5, fidelity="draft", phases=[{"type": "deposit"}], particle=ROD)
+    found = points(tmp_path, {"particle.length_m": [0.01, 0.015]}, scene=rods)
+    assert [point.scene.model_dump()["particle"][0]["length_m"] for point in found] == [0.01, 0.015]
+    two = Scene(seed=1, count=6, fidelity="draft", phases=[{"type": "deposit"}], particle=[ROD, RING])
+    with pytest.raises(InputError, match=r"as in particle\.0\.length_m"):
+        points(tmp_path, {"particle.length_m": [0.01, 0.015]}, scene=two)
+
+
 def test_text_in_a_named_value_is_no_template(tmp_path: Path) -> None:
     name = 'it\'s "{{ 7 * 7 }}" \\ {% raw %} μ'
     assert [point.scene.name for point in points(tmp_path, {"name": {"odd": name}})] == [name]
