@@ -175,13 +175,16 @@ class Display:
             )
             for row in self._rows
         ]
-        # The bars have the columns that texts leave free; texts are cut only if even short bars do not fit.
-        texts = sum(max(map(len, column)) for column in zip(*((row.label, *more) for row, *more in cells), strict=True))
+        # The time left stays whole; long labels are cut before it, and then details. Bars have what texts leave free.
         room = console.width - _ECHO
-        width = min(max(room - texts - 3 * _GAP, _BARS[0]), _BARS[1])
+        lefts = max(len(left) for *_, left in cells)
+        labels = min(max(len(row.label) for row, *_ in cells), room // 3)
+        others = labels + lefts + 3 * _GAP
+        details = max(min(max(len(detail) for _, detail, _ in cells), room - others - _BARS[0]), 1)
+        width = min(max(room - others - details, _BARS[0]), _BARS[1])
         grid = Table.grid(padding=(0, _GAP))
-        for _ in range(4):
-            grid.add_column(no_wrap=True, overflow="ellipsis")
+        for most in (labels, None, details, lefts):
+            grid.add_column(no_wrap=True, overflow="ellipsis", max_width=most)
         for row, detail, left in cells:
             bar = "" if row.fraction is None else ProgressBar(1.0, row.fraction, width=width)
             grid.add_row(Text(escaped(row.label)), bar, Text(escaped(detail)), Text(left))

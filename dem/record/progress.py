@@ -72,7 +72,7 @@ def row_of(progress: Progress, *, label: str = "") -> Row:
     """
     phase = progress.phase or "starting"
     if progress.phases is not None and progress.index is not None:
-        phase += f" ({progress.index + 1} of {progress.phases})"
+        phase += f" {progress.index + 1}/{progress.phases}"
     parts = [phase] if label else []
     if progress.time_s is not None:
         parts.append(f"t = {progress.time_s:.2f} s")

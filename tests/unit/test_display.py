@@ -89,3 +89,23 @@ def test_folded_lines_keep_columns_and_words() -> None:
     assert folded(long, width=60).splitlines()[-1].strip() == "x" * 100  # a path stays whole
     assert folded("a  b\n\nc", width=10) == "a  b\n\nc"
     assert folded("x" * 500, width=None) == "x" * 500
+
+
+def test_long_rows_keep_the_time_left_on_a_narrow_terminal() -> None:
+    from rich.console import Console  # noqa: PLC0415
+
+    rows = [
+        Row(label="a name of a run that is far too long for it", fraction=0.5, detail="x" * 60, left_s=65.0),
+        Row(label="3 of 9 runs ended", fraction=0.3, left_s=3700.0),
+    ]
+    display = Display(io.StringIO(), patience_s=0.0)
+    display.update(*rows)
+    console = Console(file=io.StringIO(), width=60, force_terminal=False)
+    with console.capture() as shown:
+        console.print(display._drawing(console))
+    first, second = shown.get().splitlines()
+    assert first.rstrip().endswith("1:05 left")
+    assert "50 %" in first
+    assert "…" in first
+    assert second.rstrip().endswith("1:01:40 left")
+    assert max(len(first.rstrip()), len(second.rstrip())) <= 55  # five columns stay free for ^C

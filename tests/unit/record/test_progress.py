@@ -97,10 +97,10 @@ def test_a_growing_pile_does_most_work_at_the_end() -> None:
 def test_rows_name_phase_and_numbers() -> None:
     numbers = {"phases": 4, "total": 40, "phi": 0.1}
     pour = Progress(phase="deposit", index=0, time_s=0.4, count=30, fraction=0.2, left_s=9.4, **numbers)
-    assert row_of(pour).to_text() == "deposit (1 of 4) 20 %, t = 0.40 s  30 of 40 poured, 0:09 left"
+    assert row_of(pour).to_text() == "deposit 1/4 20 %, t = 0.40 s  30 of 40 poured, 0:09 left"
     shake = Progress(phase="shake", index=2, time_s=1.4, count=40, fraction=0.7, left_s=3.0, **numbers)
-    assert row_of(shake).to_text() == "shake (3 of 4) 70 %, t = 1.40 s  φ 0.100, 0:03 left"
-    assert row_of(shake, label="a").to_text() == "a 70 %, shake (3 of 4)  t = 1.40 s, 0:03 left"
+    assert row_of(shake).to_text() == "shake 3/4 70 %, t = 1.40 s  φ 0.100, 0:03 left"
+    assert row_of(shake, label="a").to_text() == "a 70 %, shake 3/4  t = 1.40 s, 0:03 left"
 
 
 def test_bodies_that_hang_have_no_packing_fraction(tmp_path: Path, wall: Wall) -> None:

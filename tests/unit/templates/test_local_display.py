@@ -33,7 +33,7 @@ def test_plain_lines_are_whole_and_report_events() -> None:
 
 def test_rows_are_of_each_running_run_and_of_the_sweep() -> None:
     assert [row.to_text() for row in SNAPSHOT.rows] == [
-        "lw0.70_seed1 40 %, shake (2 of 2)  t = 1.20 s, 0:50 left",
+        "lw0.70_seed1 40 %, shake 2/2  t = 1.20 s, 0:50 left",
         "lw0.40_seed1, starting",
         "3 of 9 runs ended, 1 failed 33 %, 2:05 left",
     ]
