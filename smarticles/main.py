@@ -186,7 +186,10 @@ def _complain(text: str, error: BaseException, debug: bool) -> None:
             traceback.print_exception(error)
 
 
-def _stop(_number: int, _frame: FrameType | None) -> None:
+def _stop(number: int, _frame: FrameType | None) -> None:
+    if number == signal.SIGHUP:
+        # Both the kernel and the shell send it when a terminal closes; the second must not disturb the stop.
+        signal.signal(number, _ignore)
     raise KeyboardInterrupt
 
 

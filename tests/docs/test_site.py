@@ -73,7 +73,11 @@ def test_pages_load_only_local_files(site: Path) -> None:
 
 @pytest.mark.parametrize(
     ("page", "words"),
-    [("how-to/functions", ["radial", "distribution"]), ("how-to/frames", ["quaternion"]), ("how-to/pictures", ["legend"])],
+    [
+        ("how-to/functions", ["radial", "distribution"]),
+        ("how-to/frames", ["quaternion"]),
+        ("how-to/pictures", ["legend"]),
+    ],
 )
 def test_the_search_finds_what_users_look_for(site: Path, page: str, words: list[str]) -> None:
     text = (site / "searchindex.js").read_text(encoding="utf-8")

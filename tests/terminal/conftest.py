@@ -37,7 +37,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "scene.yaml").write_text(_SCENE)
     template = _SCENE.replace("duration_s: 0.2", "duration_s: {{ shake_s }}")
     (folder / "template.yaml").write_text(template + "contact: {friction_smarticle: {{ mu }}}\n")
-    for name, shake_s in (("sweep.yaml", "0.2"), ("long.yaml", "40")):
+    for name, shake_s in (("sweep.yaml", "0.2"), ("long.yaml", "600")):
         (folder / name).write_text(_SWEEP.replace("SHAKE_S", shake_s))
     with typed(folder, "run", "scene.yaml", "--out", "runs/a") as terminal:
         assert terminal.end() == 0

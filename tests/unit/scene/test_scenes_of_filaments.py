@@ -91,7 +91,7 @@ def test_a_plan_has_their_step_and_effects() -> None:
     ({"engine": "yade"}, "phases.1 (wriggle): active bending: only engine: links computes that"),
     ({"engine": "lammps"}, "particle: filament on engine: lammps, which has none; use engine: links"),
     ({"particle.segments": 60}, "particle.shape: filament: bar 0: 0.0005 m long; make it longer than its thickness"),
-    ({"particle.young_modulus_Pa": -1}, "particle.young_modulus_Pa: -1 is out of range; use at least 1"),
+    ({"particle.young_modulus_Pa": -1}, "particle.young_modulus_Pa: -1 Pa is out of range; use at least 1 Pa"),
     ({"particle.roll_drag_N_s": -1}, "particle.roll_drag_N_s: -1 N s is out of range; use at least 0 N s"),
     ({"particle.roll_drag_N_s": 2}, "particle.roll_drag_N_s: 2 N s is out of range; use at most 1 N s"),
     ({"particle.roll_drag_N_s": math.inf}, "particle.roll_drag_N_s: inf is not a finite number; give one in N s"),

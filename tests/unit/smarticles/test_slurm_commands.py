@@ -85,8 +85,8 @@ def test_a_sweep_is_submitted_followed_and_resumed(
     assert said.out.startswith(f"{out}: job 7: 2 of 2 runs, 2 tasks of 1 run: 1 cores, 1024 MiB, ")
     queue += ["NAME|7|0|RUNNING|None", "NAME|7|1|CANCELLED|None"]
     lines = smarticles("status", out).out.splitlines()
-    assert lines[1].split() == ["n5", "missing", "7_1", "-", "-", "Slurm:", "CANCELLED"]
-    assert lines[2].split() == ["n6", "running", "7_0", "-", "-"]
+    assert lines[1].split() == ["n5", "missing", "7_1", "Slurm:", "CANCELLED"]
+    assert lines[2].split() == ["n6", "running", "7_0"]
     answer = json.loads(smarticles("status", out, "--json").out)
     assert answer["queue"] == {"jobs": [7], "error": None, "tasks": {"CANCELLED": 1, "RUNNING": 1}}
     said = smarticles("resume", out)
