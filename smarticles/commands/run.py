@@ -164,7 +164,9 @@ def _run_until(
     if outcome is None:
         print(f"{out}: was already done")
     else:
-        print(f"{out}: done, {outcome.time_s:.2f} s simulated in {outcome.wall_s:.0f} s")
+        print(
+            f"{out}: done, {outcome.time_s:.2f} s simulated in {outcome.wall_s:.{0 if outcome.wall_s > 10 else 1}f} s"
+        )
     print(f"next: smarticles measure {quoted_out}, smarticles render {quoted_out}")
     return 0
 

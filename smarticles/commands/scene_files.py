@@ -9,7 +9,7 @@ from textwrap import wrap
 from typing import Any
 
 from dem.errors import InputError, nearest
-from dem.terminal import text_width
+from dem.terminal import say, text_width
 from smarticles.command_line import Commands, add_options, as_json
 from smarticles.starters import KINDS, about, starter
 
@@ -69,7 +69,7 @@ def write_scene(arguments: argparse.Namespace) -> int:
         msg = f"--output {output}: the folder {output.parent} does not exist; make it, or choose another one"
         raise InputError(msg) from None
     scene, run = shlex.quote(str(output)), shlex.quote(f"runs/{output.stem}")
-    print(f"{output}: {about(arguments.kind)}")
+    say(f"{output}: {about(arguments.kind)}")
     print(f"next: smarticles plan {scene}, smarticles run {scene} --out {run}")
     return 0
 

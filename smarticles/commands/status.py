@@ -113,7 +113,8 @@ class _Status:
         if self.queue is not None and self.queue["error"]:
             lines.append(f"{self.queue['error']}; the states above come from the run directories alone")
         counts = ", ".join(f"{count} {state}" for state, count in self.counts.items())
-        return "\n".join([*lines, f"{self.name}: {len(self.runs)} runs, {counts}"])
+        runs = "1 run" if len(self.runs) == 1 else f"{len(self.runs)} runs"
+        return "\n".join([*lines, f"{self.name}: {runs}, {counts}"])
 
 
 def _read_all(directories: Sequence[Path]) -> list[_Status]:

@@ -57,7 +57,7 @@ ALLOWED = (
     ("*/.lock", r".*", "process that ran"),
     ("*/log.txt", r"^[-\d]+ [:\d]+,\d+", "date"),
     ("*/log.txt", r"(?<= after )[\d.]+(?= s of wall time$)", "wall time"),
-    ("*.txt", r"(?<= simulated in )\d+(?= s$)", "wall time"),
+    ("*.txt", r"(?<= simulated in )[\d.]+(?= s$)", "wall time"),
     ("*.txt", r"(?<=(?:done|iled) after )[\d:]+", "wall time"),
     ("*.txt", r"^\d+ of \d+ runs ended.*", "printed twice a minute of wall time"),
     ("*-plan.*", r"(?<=table: )/\S*(?=/results/accuracy/)", "where the checkout lies"),
