@@ -79,8 +79,13 @@ class Page:
 
     @cached_property
     def made(self) -> tuple[Path, ...]:
-        """Committed pictures that the commands of the page make, `docs/pictures/PAGE/NAME.png`."""
-        return tuple(sorted((DOCS / "pictures" / self.path.stem).glob("*.png")))
+        """Committed pictures that the commands of the page make, `docs/pictures/PAGE/NAME.png`.
+
+        Pages of one name in different folders share a folder of pictures, so that the blocks decide.
+        """
+        text = "".join(block.text for block in self.blocks)
+        pictures = (DOCS / "pictures" / self.path.stem).glob("*.png")
+        return tuple(sorted(picture for picture in pictures if picture.name in text))
 
 
 def pages() -> tuple[Page, ...]:
