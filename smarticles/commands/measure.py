@@ -106,7 +106,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
         table = measured(
             arguments.directories, frames=arguments.frames, also=arguments.also, jobs=jobs, progress=progress
         )
-    runs = states(arguments.directories) if by else None
+    runs, without = states(arguments.directories) if by else None, [] if arguments.json else _without_frames(table)
     table = _selected(table, arguments, by, runs)
     if output is not None:
         write_table(table, output, overwrite=arguments.overwrite)
@@ -121,7 +121,7 @@ def measure_runs(arguments: argparse.Namespace) -> int:
     poured = bool((table["phase type"] == POUR).any())
     print(_legend({column for _, column, _, _ in shown}, per_frame=arguments.frames, by=by, poured=poured))
     notes = _notes(table) if runs is None else _left_out(runs, unfinished=arguments.unfinished)
-    for note in [*_without_values(table, arguments.also), *notes, *_without_frames(directories)]:
+    for note in [*_without_values(table, arguments.also), *notes, *without]:
         print(f"note: {note}")
     if output is not None:
         print(f"{output}: {len(table)} rows, {len(table.columns)} columns")
@@ -236,18 +236,20 @@ def _notes(table: pd.DataFrame) -> list[str]:
     return notes
 
 
-def _without_frames(directories: Sequence[Path]) -> list[str]:
-    """Return a note for each phase of finished runs that has samples and no frame, and thus no row."""
+def _without_frames(table: pd.DataFrame) -> list[str]:
+    """Return a note for each phase of finished runs that has samples but no frame, and thus no row in the table."""
     from dem.record.run import Run  # noqa: PLC0415
 
     found: dict[tuple[int, str], list[Path]] = {}
-    for run in map(Run, directories):
-        if run.status.state != DONE or run.lost_series:
+    for name, rows in table[table[STATE] == DONE].groupby("run", sort=False):
+        run, seen = Run(Path(str(name))), set(rows["phase"])
+        missing = [phase for phase in run.manifest.phases if phase.index not in seen]
+        if not missing or run.lost_series:
             continue
         sampled = run.series["phase"]
-        for phase in run.manifest.phases:
+        for phase in missing:
             # A phase of one time step, such as place, has one sample at most.
-            if (sampled == phase.index).sum() > 1 and not run.frames.in_phase(phase.index):
+            if (sampled == phase.index).sum() > 1:
                 found.setdefault((phase.index, phase.type), []).append(run.path)
     return [
         f"{runs[0]}{f' and {len(runs) - 1} more' if runs[1:] else ''}: phase {index} ({kind}) ended before a frame was "

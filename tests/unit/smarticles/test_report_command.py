@@ -85,6 +85,7 @@ def test_the_page_of_a_run_has_everything(run: Path, smarticles: Smarticles) -> 
     (run / "log.txt").write_text("2026-11-22 07:00:00,000 WARNING two hooks\n" * 3 + "2026-11-22 07:00:00 INFO fine\n")
     said = smarticles("report", run)
     assert said.status == 0
+    assert all(line.startswith("report of ") for line in said.err.splitlines())  # progress of a slow machine alone
     page = Read(run / "report.html")
     titles = [attributes["id"] for attributes in page.of("section")]
     assert titles == [

@@ -305,7 +305,8 @@ def test_render_draws_a_film_of_a_part_in_fixed_colours(
     words = ("--size", "320x240", "--from", "0.5", "--to", "2", "--every", "0.5", "--fps", "20", "--clim", "0:5")
     said = smarticles("render", run, "--output", film, *words)
     assert (said.status, said.out) == (0, f"{film}\n")
-    assert "\x1b" not in said.err  # nothing is redrawn where there is no terminal
+    # Nothing is redrawn where there is no terminal; a slow machine prints lines of progress.
+    assert all(line.startswith(("drawing", "pictures drawn")) for line in said.err.splitlines())
     with Image.open(film) as images:
         assert (images.n_frames, images.size) == (4, (320, 240))
         images.seek(1)
