@@ -11,12 +11,12 @@ import yaml
 
 from dem.errors import InputError, shown
 from dem.notebook import Facts, Shown, bodies_text
+from dem.record.checkpoint import has_checkpoint
 from dem.record.document import REMEDY, Done, Failed, Manifest, Phase, Progress
 from dem.record.files import cannot_read
 from dem.record.forces import RecordedForces, has_forces, read_forces
 from dem.record.frames import FrameSequence, read_frames
 from dem.record.names import (
-    CHECKPOINT,
     DONE,
     FAILED,
     FRAME,
@@ -184,7 +184,7 @@ class Run(Shown):
     @property
     def can_resume(self) -> bool:
         """Whether the run was interrupted or killed, and left a checkpoint."""
-        return self.status.state in ("interrupted", "stopped") and (self.path / CHECKPOINT).is_file()
+        return self.status.state in ("interrupted", "stopped") and has_checkpoint(self.path)
 
     @property
     def lost_series(self) -> str | None:

@@ -173,7 +173,8 @@ def test_the_command_runs_on_two_ranks_and_what_it_leaves_is_measured(tmp_path: 
         return subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
 
     said = call("run", file, "--out", out, "--ranks", "2")
-    assert (said.returncode, said.stderr) == (0, ""), said.stderr
+    assert said.returncode == 0, said.stderr
+    assert "warning" not in said.stderr  # a slow machine tells how far it is
     manifest = json.loads((out / "run.json").read_text())
     assert (manifest["engine"], manifest["threads"]) == ("lammps", 2)
     assert set(manifest["versions"]) >= {"lammps"}

@@ -95,7 +95,7 @@ def goes_on(out: str, here: Path, type_command: Type) -> None:
         lines = terminal.wait_for(lambda lines: "shake" in bar(lines))
         time_s = re.search(r"t = ([\d.]+) s", bar(lines))
         assert time_s
-        assert float(time_s[1]) > 0.9 * reached
+        assert float(time_s[1]) > 0.5 * reached  # a stop while the newest checkpoint is written leaves the one before
         terminal.press_ctrl_c()
         assert terminal.end() == 130
 
@@ -103,7 +103,7 @@ def goes_on(out: str, here: Path, type_command: Type) -> None:
 def shaking(lines: list[str]) -> bool:
     """Return whether the bar shows a run that shakes and has a checkpoint."""
     time_s = re.search(r"t = ([\d.]+) s", bar(lines))
-    return "shake" in bar(lines) and time_s is not None and float(time_s[1]) > 2
+    return "shake" in bar(lines) and time_s is not None and float(time_s[1]) > 6
 
 
 def test_after_ctrl_c_the_last_line_says_how_to_go_on(here: Path, type_command: Type) -> None:

@@ -66,10 +66,11 @@ def test_a_run_is_running_while_a_process_holds_its_lock(tmp_path: Path) -> None
     assert Run(tmp_path).status.state == "stopped"
 
 
-def test_a_run_can_be_resumed_from_a_checkpoint_unless_it_failed(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["checkpoint.zip", "checkpoint.previous.zip"])  # a stop between two renames leaves one
+def test_a_run_can_be_resumed_from_a_checkpoint_unless_it_failed(name: str, tmp_path: Path) -> None:
     (tmp_path / "run.json").write_text("{}")
     assert not Run(tmp_path).can_resume
-    (tmp_path / "checkpoint.zip").write_text("")
+    (tmp_path / name).write_text("")
     assert Run(tmp_path).can_resume
     (tmp_path / "failed.json").write_text(json.dumps(FAILED))
     assert not Run(tmp_path).can_resume
