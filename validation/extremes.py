@@ -6,6 +6,7 @@ alone and shares no code with the engines.
 """
 
 import argparse
+import json
 import os
 import re
 import shutil
@@ -24,6 +25,7 @@ import yaml
 from numpy.typing import NDArray
 
 from postprocess import read_frames
+from validation.checks import Solid, axes_in_solids, floor_error, linked_pairs, unrest
 
 Array = NDArray[np.float64]
 
@@ -110,6 +112,72 @@ def draw_scene(number: int) -> dict[str, Any]:
     else:
         phases.append([{"type": "relax", "duration_s": SECONDS}, shake, change, swing, sine][chosen])
     return {**scene, "phases": phases}
+
+
+BODIES = ("closed", "flat", "thin", "mixed", "driven", "plate")
+"""Families of scenes of bodies that are no smarticles; a scene's number modulo their number is its family."""
+
+
+def draw_bodies(number: int) -> dict[str, Any]:
+    """Return a random scene of bodies as a dictionary; `number` is the seed of the draw and of the scene."""
+    rng = np.random.default_rng([45, number])
+    family = BODIES[number % len(BODIES)]
+
+    def span(low: float, high: float) -> float:
+        return float(f"{rng.uniform(low, high):.4g}")
+
+    length, density = span(6e-3, 16e-3), span(1000, 8000)
+    flat = {"thickness_normal_m": span(1e-3, 3e-3), "thickness_in_plane_m": span(0.3e-3, 0.6e-3)}
+    staple = {"shape": "staple", "crown_m": length, "leg_m": span(0.3, 1) * length}
+    rod = {"shape": "rod", "length_m": length, "density_kg_per_m3": density}
+    particle: Any = {**[staple, rod, {"shape": "z", "middle_m": length, "arm_m": length / 2}][rng.integers(3)], **flat}
+    fidelity, radius = "draft", 1.6 * length
+    last: dict[str, Any] = {"type": "shake", "duration_s": SECONDS, "frequency_hz": span(15, 60)}
+    last["peak_acceleration_g"] = span(1, 4)
+    if family == "closed":
+        particle = {"shape": "ring", "radius_m": length / 2, "diameter_m": span(0.05, 0.12) * length}
+        if rng.random() < 0.5:
+            around = 2 * np.pi * np.arange(5) / 5
+            points = [[float(f"{length / 2 * f(a):.6g}") for f in (np.cos, np.sin)] + [0.0] for a in around]
+            bars = [[i, (i + 1) % 5] for i in range(5)]
+            particle = {"shape": "segments", "points_m": points, "pairs": bars, "diameter_m": particle["diameter_m"]}
+    elif family in ("flat", "plate"):
+        fidelity = str(rng.choice(["standard", "reference"]))
+    elif family == "thin":
+        section = {"thickness_normal_m": 1.27e-3, "thickness_in_plane_m": 0.5e-3}
+        particle = [{**staple, **section}, {**rod, "diameter_m": span(0.15e-3, 0.5e-3)}]
+        fidelity = "standard"
+    elif family == "mixed":
+        thick = span(1e-3, 3e-3)
+        crossed = {"shape": "cross", "arm_m": length / 2, "diameter_m": thick, "density_kg_per_m3": density}
+        particle = [{**rod, "diameter_m": float(f"{thick / span(2, 8):.3g}"), "share": 3}, {**crossed, "share": 1}]
+        last = {"type": "relax", "duration_s": 1.0}
+    elif family == "driven":
+        particle, last = (
+            {**rod, "diameter_m": 1e-3},
+            {**last, "frequency_hz": float(f"{10 ** rng.uniform(1.5, 3.3):.4g}")},
+        )
+        if rng.random() < 0.5:
+            last |= {"taps": int(rng.integers(2, 6)), "rest_s": 0.05}
+            del last["duration_s"]
+    if family == "plate":
+        last = {"type": "compress", "speed_m_per_s": span(0.005, 0.05), "strain": 0.1}
+    phases = [{"type": "deposit", "per_layer": int(rng.integers(4, 12))}, {"type": "relax", "duration_s": 0.1}, last]
+    return {
+        "schema_version": 2,
+        "engine": "links",
+        "name": f"{family} {number}",
+        "seed": number,
+        "count": int(rng.integers(20, 41)),
+        "particle": particle,
+        "container": {"radius_m": radius},
+        "fidelity": fidelity,
+        "phases": phases,
+        "recording": {
+            "frame_interval_s": 2e-3, "series_interval_s": 1e-3, "energy": True,
+            "dissipation_interval_s": 2e-4, "checkpoint_interval_s": None
+        },
+    }  # fmt: skip
 
 
 # -- the checker -------------------------------------------------------------------------------------------------------
@@ -258,6 +326,70 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+RESTLESS = 0.02  # largest change of speed of a bar between two frames of a pile at rest, over sqrt(g t)
+KICK = 0.05  # largest speed of a body that a plate has just reached, above twice its own [m/s]
+STEPS_A_PERIOD = 20  # least number of time steps in a period of a drive
+FLOOR = 1e-3  # largest deviation of a floor from what the scene asks for, over its amplitude
+
+
+def check_bodies(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
+    """Check the finished run of a scene of `draw_bodies`; return measured values by quantity, as `check_run` does."""
+    manifest = json.loads((path / "run.json").read_text())
+    ended = json.loads((path / "done.json").read_text())["phases"]
+    kinds = [Solid(kind["thickness_normal_m"] / 2, kind["thickness_in_plane_m"] / 2) for kind in manifest["kinds"]]
+    asked, start = scene["phases"][-1], ended[-1]["start_s"]
+    crossed: set[tuple[int, int]] = set()
+    inside: set[tuple[int, int]] = set()
+    linked: set[tuple[int, int]] = set()
+    times, floors, speeds, spins = [], [], [], []
+    last = None
+    for frame in read_frames(path):
+        ends, body = frame.segments, frame.body
+        solids = [kinds[kind] for kind in frame.kind[body]]
+        linked.update(linked_pairs(ends, body))
+        inside.update(axes_in_solids(ends, body, frame.normals, solids))
+        if last is not None:
+            count = min(len(last), len(ends))
+            crossed.update(crossings(last[:count], ends[:count], body[:count]))
+        last = ends
+        if frame.time >= start and frame.phase == len(ended) - 1:
+            times.append(frame.time)
+            floors.append(frame.floor_z)
+            speeds.append(frame.link_velocity)
+            spins.append(frame.link_angular_velocity)
+    values: dict[str, float] = {
+        "pairs of axes crossed [1]": len(crossed),
+        "axes inside solid bars [1]": len(inside),
+        "pairs of closed bodies linked [1]": len(linked),
+    }
+    wrong = [f"{name.removesuffix(' [1]')}: {value}" for name, value in values.items() if value]
+    if asked["type"] == "relax":
+        thinnest = 2 * min(min(kind) for kind in kinds)
+        values["change of speed at rest [sqrt(g t)]"] = found = unrest(
+            np.array(speeds[-50:]), np.array(spins[-50:]), thinnest
+        )
+        if found > RESTLESS:
+            wrong.append(f"not at rest: speeds change by {found:.2g} sqrt(g t) from frame to frame")
+    if asked["type"] == "shake":
+        steps = 1 / asked["frequency_hz"] / manifest["phases"][-1]["time_step_s"]
+        error = floor_error(np.array(times), np.array(floors), asked, start)
+        values |= {"steps in a period [1]": steps, "floor's deviation [1]": error}
+        if steps < STEPS_A_PERIOD - 1e-6:
+            wrong.append(f"{steps:.1f} steps in a period of the drive")
+        if error > FLOOR:
+            wrong.append(f"the floor is {error:.2g} amplitudes from where it should be")
+    if asked["type"] == "compress":
+        soon = [speed for time, speed in zip(times, speeds, strict=True) if time < start + 0.01]
+        fastest = max((float(np.linalg.norm(speed, axis=-1).max()) for speed in soon), default=0.0)
+        values["fastest body at the plate's start [m/s]"] = fastest
+        if fastest > 2 * asked["speed_m_per_s"] + KICK:
+            wrong.append(f"the plate begins with a kick, {fastest:.3g} m/s")
+    excess, _ = energy_errors(path)
+    if not excess <= ENERGY:
+        wrong.append(f"energy {100 * excess:.1f} % above what was put in")
+    return {**values, "energy above what was put in [1]": excess, "wrong": "; ".join(wrong)}
+
+
 def energy_errors(path: Path) -> tuple[float, float]:
     """Return two relative errors of the energy in a run, from the series in its directory `path`.
 
@@ -289,16 +421,19 @@ def energy_errors(path: Path) -> tuple[float, float]:
 RIGHT, REJECTED, STOPPED, WRONG, LATE = "right", "rejected by plan", "stopped with a cause", "WRONG", "out of time"
 
 
-def run_one(number: int, out: Path, tree: Path, limit: float) -> dict[str, Any]:
+def run_one(number: int, out: Path, tree: Path, limit: float, bodies: bool = False) -> dict[str, Any]:
     """Plan, run and check the scene with a number; return its row of the table.
+
+    `bodies`: whether it is a scene of `draw_bodies`, rather than one of smarticles.
 
     `tree` is the source tree whose `smarticles` is used, `limit` the largest wall time of `plan` and of `run` [s].
     """
-    scene, path, run = draw_scene(number), out / f"{number:04d}.yaml", out / f"{number:04d}"
+    scene = draw_bodies(number) if bodies else draw_scene(number)
+    path, run = out / f"{number:04d}.yaml", out / f"{number:04d}"
     path.write_text(yaml.safe_dump(scene, sort_keys=False), encoding="utf-8")
     shutil.rmtree(run, ignore_errors=True)
     begun = time.monotonic()
-    row = {"scene": number, "count": scene["count"], "last phase": scene["phases"][-1]["type"]}
+    row = {"scene": number, "name": scene["name"], "count": scene["count"], "last phase": scene["phases"][-1]["type"]}
     environment = {**os.environ, "PYTHONPATH": str(tree), "OMP_NUM_THREADS": "1"}
     end, cause = "", ""
     for what, arguments in (("plan", ["plan", str(path)]), ("run", ["run", str(path), "--out", str(run)])):
@@ -317,7 +452,7 @@ def run_one(number: int, out: Path, tree: Path, limit: float) -> dict[str, Any]:
             break
     row |= {"end": end, "cause": cause, "wall time [s]": round(time.monotonic() - begun, 1)}
     if not end:
-        found = check_run(run, scene)
+        found = check_bodies(run, scene) if bodies else check_run(run, scene)
         cause = found.pop("wrong")
         row |= {"end": WRONG if cause else RIGHT, "cause": cause, **found}
     if row["end"] != WRONG:
@@ -337,6 +472,9 @@ def main() -> int:
     parser.add_argument(
         "--tree", type=Path, default=Path.cwd(), help="source tree to run (default: the working directory)"
     )
+    parser.add_argument(
+        "--bodies", action="store_true", help="scenes of bodies of any shape, rather than of smarticles"
+    )
     parser.add_argument("--out", type=Path, required=True, help="folder for table, scenes and failed runs")
     arguments = parser.parse_args()
     out = arguments.out.resolve()
@@ -346,12 +484,13 @@ def main() -> int:
     numbers = range(arguments.first, arguments.first + arguments.count)
     missing = [number for number in numbers if number not in {row["scene"] for row in rows}]
     with ProcessPoolExecutor(arguments.jobs) as pool:
-        runs = [pool.submit(run_one, number, out, arguments.tree.resolve(), arguments.limit) for number in missing]
+        how = (out, arguments.tree.resolve(), arguments.limit, arguments.bodies)
+        runs = [pool.submit(run_one, number, *how) for number in missing]
         for run in runs:
             rows.append(run.result())
             pd.DataFrame(rows).to_csv(path, index=False, float_format="%.4g")
             row = rows[-1]
-            print(f"{row['scene']:4d} {row['end']:20s} {row['last phase']}: {row['cause']}", flush=True)
+            print(f"{row['scene']:4d} {row['end']:20s} {row['name']}, {row['last phase']}: {row['cause']}", flush=True)
     table = pd.DataFrame(rows)
     print(table["end"].value_counts().to_string())
     return int((table["end"] == WRONG).any())
