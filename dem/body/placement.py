@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array, Numbers
 from dem.body.kinds import Body
-from dem.body.linear import applied, eigen_symmetric
+from dem.body.linear import applied, eigen_symmetric, turned
 from dem.body.particle import Boxes
 from dem.errors import RunError
 
@@ -81,7 +81,7 @@ def place_layer(
         particle = each[len(positions)]
         for _ in range(ATTEMPTS):
             rotation = Rotation.random(random_state=rng)
-            spheres = rotation.apply(particle.centres)
+            spheres = turned(rotation.as_matrix(), particle.centres)
             distance, angle = radius * math.sqrt(rng.random()), 2 * math.pi * rng.random()
             lift = rng.random()
             lowest = spheres[:, 2].min() - particle.radius
