@@ -521,3 +521,11 @@ def spheres_of(state: PileState, model: Particle | Mixture) -> Array:
         assert state.bodies is not None  # a pile of these kinds has no smarticles
         return state.bodies.spheres()
     return state.smarticles.spheres(model)
+
+
+def bars_by_body(state: PileState) -> list[Array]:
+    """Return both ends (S, 2, 3) of the S bars, or links, of each body [m]."""
+    if state.bodies is None:
+        vertices = state.smarticles.vertices
+        return list(np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2))
+    return np.split(state.bodies.segments, np.flatnonzero(np.diff(state.bodies.body)) + 1)
