@@ -1,8 +1,10 @@
 """Closed curves of bodies, and whether curves of two bodies are linked.
 
 A curve is closed if it consists of bars that are joined, or if it has gates: gaps from a free end to another bar of the
-same rigid body that are too narrow for the thinnest bar of a scene. Chains and filaments have free ends, and bodies
-that bend open and close, so that they have no such curves.
+same rigid body through which nothing passes. The distance of the axes at a gate is below √2 (r + s), with the radius r
+of the body and the radius s of the thinnest bar of a scene. A bar needs 2 (r + s). Two gates of widths a and b cross
+each other only if the bars at their ends, (a² + b²)^½ / 2 apart, do not touch, which these widths exclude. Chains and
+filaments open and close as they bend, so that they have no such curves.
 """
 
 import math
@@ -18,6 +20,7 @@ from dem.body.bars import first_ends
 from dem.body.kinds import Body, Kind
 from dem.body.linear import by_element
 from dem.body.particle import Particle
+from dem.body.state import PileState, bars_by_body
 
 WHOLE = 0.5  # of a linking number, which is a whole number up to rounding
 AT_AN_END = 1e-6  # of a bar's length: nearest points that are nearer to an end lie at it
@@ -45,42 +48,59 @@ def bars_of(body: Body) -> Array:
 
 
 def loops_of(body: Body, *, thinnest: float = 0.0) -> list[Loop]:
-    """Return closed curves of a body that are a basis of all: every other one is a sum of them.
+    """Return closed curves of a body, of which every other one is a sum.
 
-    Gates are too narrow for a bar of the diameter `thinnest` [m].
+    The diameter of the thinnest bar of the scene, `thinnest` [m], decides what is a gate.
     """
     if body.filament is not None or body.linkage is not None:
         return []
     segments = bars_of(body)
     segments = segments[np.abs(segments[:, 1] - segments[:, 0]).max(axis=1) > 0]  # barbs may have no length
     nodes = first_ends(segments).reshape(-1, 2)
-    count = len(segments)
-    places: dict[int, tuple[int, float]] = {2 * bar + end: (bar, float(end)) for bar in range(count) for end in (0, 1)}
+    free = np.bincount(nodes.ravel(), minlength=nodes.size)[nodes] == 1
+    # Axes of swept bars begin and end a radius within free ends.
+    inset = np.minimum(
+        0.5, free * (body.radius / np.sqrt(((segments[:, 1] - segments[:, 0]) ** 2).sum(axis=1)))[:, None]
+    )
+    ends = np.array([0.0, 1.0]) + inset * [1.0, -1.0]
+    places = [(k // 2, float(share)) for k, share in enumerate(ends.ravel())]
     edges = [(int(a), int(b)) for a, b in nodes]
-    for tip, bar, share in _gates(segments, nodes, 2 * body.radius + thinnest):
-        places[len(places)] = (bar, share)
-        edges += [(tip, len(places) - 1), (len(places) - 1, int(nodes[bar, 0]))]
+    for tip, bar, share in _gates(segments, nodes, ends, (2 * body.radius + thinnest) / math.sqrt(2)):
+        edges += [(tip, len(places)), (len(places), int(nodes[bar, 0]))]
+        places.append((bar, share))
     return [
         Loop(np.array([places[k][0] for k in cycle]), np.array([places[k][1] for k in cycle]))
         for cycle in _cycles(edges, len(places))
     ]
 
 
-def _gates(segments: Array, nodes: Numbers, least: float) -> list[tuple[int, int, float]]:
-    """Return gates: the node of a free end, the bar that is nearer to it than `least` [m], and the share there."""
-    found = []
-    free = [int(k) for k in np.flatnonzero(np.bincount(nodes.ravel(), minlength=2 * len(segments)) == 1)]
-    for tip in free:
-        place, own = segments[tip // 2, tip % 2], tip // 2
-        along = segments[:, 1] - segments[:, 0]
-        shares = np.clip(((place - segments[:, 0]) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
-        apart = np.sqrt(((segments[:, 0] + shares[:, None] * along - place) ** 2).sum(axis=1))
+def curves_of(state: PileState, bodies: Sequence[Body], *, thinnest: float) -> list[list[Array]]:
+    """Return corners (n, 3) [m] of the closed curves of each body of a pile, of which `bodies` has one of each kind."""
+    loops = [loops_of(body, thinnest=thinnest) for body in bodies]
+    if not any(loops):
+        return [[]] * state.count
+    kinds = np.zeros(state.count, np.int64) if state.bodies is None else state.bodies.kind
+    bars = bars_by_body(state)
+    return [[loop.corners(own) for loop in loops[kind]] for kind, own in zip(kinds, bars, strict=True)]
+
+
+def _gates(segments: Array, nodes: Numbers, ends: Array, least: float) -> list[tuple[int, int, float]]:
+    """Return gates: the node of a free end, the bar whose axis is nearer to it than `least` [m], and the share there.
+
+    Axes begin and end at the shares `ends` (S, 2) of the segments (S, 2, 3), whose ends are the given nodes (S, 2).
+    """
+    starts, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    squares, found = (along**2).sum(axis=1), []
+    counts = np.bincount(nodes.ravel())
+    for own, end in np.argwhere(counts[nodes] == 1):
+        tip = starts[own] + ends[own, end] * along[own]
+        shares = np.clip(((tip - starts) * along).sum(axis=1) / squares, ends[:, 0], ends[:, 1])
+        apart = np.sqrt(((starts + shares[:, None] * along - tip) ** 2).sum(axis=1))
         for bar in np.flatnonzero(apart < least):
-            share = float(shares[bar])
-            end = 0 if share < AT_AN_END else 1 if share > 1 - AT_AN_END else None
-            # A neighbour is nearest where it is joined, which encloses nothing.
-            if bar != own and (end is None or nodes[bar, end] not in nodes[own]):
-                found.append((tip, int(bar), share))
+            at = nodes[bar][np.abs(shares[bar] - ends[bar]) < AT_AN_END]
+            # A neighbour is nearest where it is joined, which encloses nothing; two free ends make one gate.
+            if bar != own and not set(at) & set(nodes[own]) and (bar > own or (counts[at] != 1).all()):
+                found.append((int(nodes[own, end]), int(bar), float(shares[bar])))
     return found
 
 
@@ -120,7 +140,7 @@ def linking_number(one: Array, other: Array) -> int:
     a, b, c, d = unit[:-1, :-1], unit[:-1, 1:], unit[1:, 1:], unit[1:, :-1]
     total = 0.0
     for u, v, w in ((a, b, c), (a, c, d)):
-        volume = (u * np.cross(v, w)).sum(axis=-1)
+        volume = (u * np.cross(w, v)).sum(axis=-1)
         cosines = 1 + (u * v).sum(axis=-1) + (v * w).sum(axis=-1) + (w * u).sum(axis=-1)
         total += 2 * float(by_element(math.atan2, volume, cosines).sum())
     return round(total / (4 * math.pi))

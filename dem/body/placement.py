@@ -72,7 +72,7 @@ def place_layer(
             height; None: `radius` everywhere.
         thickest: radius of the largest obstacles, if it is above the radii of all `bodies` [m].
         curves: corners (n, 3) of closed curves of bodies that are already there [m].
-        thinnest: diameter of the thinnest bar [m]; bodies with a narrower mouth count as closed.
+        thinnest: diameter of the thinnest bar [m], which decides what counts as closed, see `loops_of`.
     """
     each = bodies if isinstance(bodies, Sequence) else [bodies] * count
     thickest = max(thickest, *(body.radius for body in each))

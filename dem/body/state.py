@@ -528,4 +528,4 @@ def bars_by_body(state: PileState) -> list[Array]:
     if state.bodies is None:
         vertices = state.smarticles.vertices
         return list(np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2))
-    return np.split(state.bodies.segments, np.flatnonzero(np.diff(state.bodies.body)) + 1)
+    return np.split(state.bodies.segments, np.flatnonzero(np.diff(state.bodies.body)) + 1)[: state.count]

@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import Field
 
 from dem.arrays import Array, Flags
-from dem.body.loops import loops_of
+from dem.body.loops import curves_of
 from dem.body.placement import place_layer
-from dem.body.state import PileState, bars_by_body, spheres_of
+from dem.body.state import PileState, spheres_of
 from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.phases.phase import (
@@ -186,11 +186,8 @@ def _curves(scene: SceneView, cylinder: Cylinder, state: PileState, which: Flags
     They are those of bodies, `which` (N,), and bars of hooks that end at the wall, too near for the thinnest bar.
     """
     thinnest = scene.model.diameter
-    loops = [loops_of(body, thinnest=thinnest) for body in scene.bodies]
-    if not any(loops):
-        return []
-    found: list[Array] = []
+    curves = curves_of(state, scene.bodies, thinnest=thinnest)
+    found = [curve for own, wanted in zip(curves, which, strict=True) if wanted for curve in own]
     for cross in scene.hooks.crosses if scene.hooks else ():
         found += cross.closed(wall=float(cylinder.inner_radii(np.array([cross.height]))[0]), narrow=thinnest)
-    bars, kinds = bars_by_body(state), np.zeros(state.count, np.int64) if state.bodies is None else state.bodies.kind
-    return found + [loop.corners(bars[k]) for k in np.flatnonzero(which) for loop in loops[kinds[k]]]
+    return found
