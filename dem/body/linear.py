@@ -67,6 +67,19 @@ def applied(matrix: Array, points: Array) -> Array:
     return matrix_product(points, np.swapaxes(matrix, -1, -2))
 
 
+def transformed(matrix: Array, vector: Array) -> Array:
+    """Return matrices (…, i, j) times vectors (…, j), as (…, i)."""
+    return matrix_product(matrix, vector[..., None])[..., 0]
+
+
+def solved(matrices: Array, vectors: Array) -> Array:
+    """Return (…, 3) solutions x of A x = b for A (…, 3, 3) and b (…, 3), by Cramer's rule."""
+    columns = [matrices[..., k] for k in range(3)]
+    across = [np.cross(columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3)]
+    volume = (columns[0] * across[0]).sum(axis=-1)
+    return np.stack([(each * vectors).sum(axis=-1) / volume for each in across], axis=-1)
+
+
 def eigen_symmetric(matrices: Array) -> tuple[Array, Array]:
     """Return eigenvalues (n, k) and eigenvectors (n, k, k) of symmetric matrices (n, k, k).
 
