@@ -68,7 +68,7 @@ def _directed(segments: Array, local: Array, *, flip: bool) -> Array:
         for k in sorted(todo):
             apart = np.linalg.norm(local[j][:, None] - local[k], axis=-1)
             a, b = np.unravel_index(apart.argmin(), apart.shape)
-            if apart[a, b] > JOINED * np.linalg.norm(local[j, 1] - local[j, 0]):
+            if apart[a, b] > JOINED * math.dist(*local[j]):
                 continue
             ways = np.linalg.norm(found[k] - found[j, a], axis=-1)
             found[k] = found[k, ::-1] if ways[1 - b] < ways[b] else found[k]

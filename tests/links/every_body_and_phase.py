@@ -201,6 +201,22 @@ CASES: dict[str, dict[str, Any]] = {
         "phases": [{"type": "place", "file": "u.csv"}, RELAX],
     },
 }
+OTHER_ENGINES: dict[str, dict[str, Any]] = {
+    "yade, smarticles": {
+        **U3,
+        "engine": "yade",
+        "smarticle": {"aspect_ratio": 0.85, "angles_deg": [80, 95]},
+        "phases": [POUR, SHAKE, {"type": "internal-oscillation", "theta_deg": 10, "duration_s": 0.05}],
+    },
+    "yade, robots": {**CASES["robots"], "engine": "yade"},
+    "yade, rigid bodies": {
+        **CASES["rigid bodies"],
+        "engine": "yade",
+        "count": 8,
+        "phases": [POUR, SHAKE],
+    },
+    "lammps, smarticles": {**U3, "engine": "lammps", "phases": [POUR, SHAKE]},
+}
 U_POINTS = [[-5.85, 8.19, 4], [-5.85, 0, 4], [5.85, 0, 4], [5.85, 8.19, 4]]
 FILES = {"arc.csv": ARC, "u.csv": [[0.6 * x - 0.8 * y, 0.8 * x + 0.6 * y, z] for x, y, z in U_POINTS]}
 
@@ -217,7 +233,7 @@ def run_case(name: str, folder: Path) -> str:
     """Run a case into a folder of its name; a digest of its series and frames."""
     base = {"schema_version": 1, "name": "tiny", "seed": 11, "engine": "links", "fidelity": "draft"}
     recording = {"frame_interval_s": 0.02, "series_interval_s": 2e-3, "checkpoint_interval_s": None}
-    case = base | CASES[name]
+    case = base | (CASES | OTHER_ENGINES)[name]
     case["recording"] = recording | case.get("recording", {})
     digest = hashlib.sha256()
     run_scene(parse_scene(case, source=name, folder=folder), folder / name, command="")
