@@ -37,10 +37,10 @@ LAYER_SECONDS = 0.125  # s, typical time between two layers of a pour; measured 
 
 
 class Deposit(Part, Phase):
-    """Pour bodies in layers of random poses without overlaps, then wait until the pile settles.
+    """Pour bodies in layers of random poses without overlaps or links, then wait until the pile settles.
 
     A layer is poured just above the pile after the previous layer has landed. If `every_s` is given, layers are poured
-    from the top of the wall at this interval.
+    from the top of the wall at this interval. Closed bodies, such as rings, are never linked with each other.
     """
 
     begins: ClassVar[bool] = True
