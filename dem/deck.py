@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from dem.body.linear import matrix_product
 from dem.body.state import State
 from dem.engine.demand import contact_law_of
 from dem.engine.lammps import text
@@ -98,7 +99,7 @@ def write_deck(scene: Scene, folder: Path) -> None:
     except OSError as error:
         raise InputError(f"--output {folder}: cannot be made ({error.strerror}); choose another place") from None
     spheres, zero = state.spheres(scene.body), np.zeros((state.count, 3))
-    turns = np.asarray(state.link_rotations[:, 1] @ scene.body.boxes.link_rotations[1].T)
+    turns = matrix_product(state.link_rotations[:, 1], scene.body.boxes.link_rotations[1].T)
     title = f"Spheres of {len(spheres)} smarticles, {spheres.shape[1]} each: {_one_line(scene.name)}"
     contents = {
         DATA: text.sphere_lines([scene.body] * state.count, scene.cylinder, spheres, title=title),

@@ -8,7 +8,7 @@ from itertools import permutations
 import numpy as np
 
 from dem.arrays import Array, Flags, Numbers
-from dem.body.linear import applied, eigen_symmetric, matrix_product
+from dem.body.linear import applied, dot, eigen_symmetric, matrix_product
 from dem.body.particle import mean_width
 from dem.errors import InputError
 
@@ -171,7 +171,7 @@ class Bars:
         moments, axes = (found[0] for found in eigen_symmetric(tensor[None]))
         order = max(permutations(range(3)), key=lambda order: sum(abs(axes[k, order[k]]) for k in range(3)))
         axes = axes[:, order] * np.where(np.diag(axes[:, order]) < 0, -1.0, 1.0)
-        axes[:, 2] *= 1.0 if np.dot(np.cross(axes[:, 0], axes[:, 1]), axes[:, 2]) > 0 else -1.0
+        axes[:, 2] *= 1.0 if dot(np.cross(axes[:, 0], axes[:, 1]), axes[:, 2]) > 0 else -1.0
         return moments[list(order)], axes
 
     @property

@@ -4,6 +4,9 @@ BLAS and LAPACK choose their kernels by the processor and differ in the last dig
 changes all poses within a second. Here everything consists of NumPy's elementwise operations and sums in a fixed order.
 """
 
+import math
+from collections.abc import Callable
+
 import numpy as np
 
 from dem.arrays import Array, Flags
@@ -19,9 +22,62 @@ def matrix_product(a: Array, b: Array) -> Array:
     return total
 
 
+def dot(a: Array, b: Array) -> float:
+    """Return the scalar product of two vectors (n,), summed from the first product on, for n < 8."""
+    return float((a * b).sum())
+
+
+def by_element(function: Callable[..., float], *values: Array) -> Array:
+    """Return a function of `math` of each element of arrays of one shape; NumPy's own depend on the processor."""
+    flat = (np.ravel(each).tolist() for each in values)
+    return np.array([function(*each) for each in zip(*flat, strict=True)]).reshape(np.shape(values[0]))
+
+
+def fused(a: Array, b: Array, c: Array) -> Array:
+    """Return a b + c (n, k), rounded once, as by processors with a fused multiply-add.
+
+    Products a b are split into their rounded values and the rest, which is exact unless it underflows. Arguments are of
+    shapes that broadcast to (n, k).
+
+    Source: Dekker, Numer. Math. 18, 224 (1971).
+    """
+
+    def halves(x: Array) -> tuple[Array, Array]:
+        shifted = 134217729.0 * x  # 2**27 + 1: halves have 26 bits
+        high = shifted - (shifted - x)
+        return high, x - high
+
+    product, (a1, a2), (b1, b2) = a * b, halves(a), halves(b)
+    rest = ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
+    terms = np.stack([product, rest, c], axis=-1).reshape(-1, 3)
+    return np.array([math.fsum(three) for three in terms.tolist()]).reshape(product.shape)
+
+
+def turned(turn: Array, points: Array) -> Array:
+    """Return points (n, 3) turned by a rotation (3, 3).
+
+    The bits are those of `scipy.spatial.transform.Rotation.apply` on processors with a fused multiply-add.
+    """
+    x, y, z = turn.T[:, None]
+    return fused(points[:, 2:], z, fused(points[:, 1:2], y, points[:, :1] * x))
+
+
 def applied(matrix: Array, points: Array) -> Array:
     """Return matrices (…, i, j) times points (…, n, j), or times common points (n, j), as (…, n, i)."""
     return matrix_product(points, np.swapaxes(matrix, -1, -2))
+
+
+def transformed(matrix: Array, vector: Array) -> Array:
+    """Return matrices (…, i, j) times vectors (…, j), as (…, i)."""
+    return matrix_product(matrix, vector[..., None])[..., 0]
+
+
+def solved(matrices: Array, vectors: Array) -> Array:
+    """Return (…, 3) solutions x of A x = b for A (…, 3, 3) and b (…, 3), by Cramer's rule."""
+    columns = [matrices[..., k] for k in range(3)]
+    across = [np.cross(columns[(k + 1) % 3], columns[(k + 2) % 3]) for k in range(3)]
+    volume = (columns[0] * across[0]).sum(axis=-1)
+    return np.stack([(each * vectors).sum(axis=-1) / volume for each in across], axis=-1)
 
 
 def eigen_symmetric(matrices: Array) -> tuple[Array, Array]:

@@ -28,6 +28,17 @@ HINGE_CLEARANCE = 0.01
 # Angle beyond 90° up to which barbs turn inwards without touching a thicker middle link [rad].
 INWARDS = math.radians(15)
 
+# Places and weights of the 24-point Gauss-Legendre rule on (-1, 1), without their mirror images. As constants, since
+# libraries compute them by LAPACK, with bits that depend on the processor.
+GAUSS = (
+    (0.06405689286260563, 0.12793819534675202), (0.1911188674736163, 0.12583745634682825),
+    (0.3150426796961634, 0.1216704729278033), (0.4337935076260451, 0.11550566805372552),
+    (0.5454214713888396, 0.10744427011596556), (0.6480936519369755, 0.09761865210411393),
+    (0.7401241915785544, 0.0861901615319532), (0.820001985973903, 0.07334648141108016),
+    (0.8864155270044011, 0.05929858491543636), (0.9382745520027328, 0.04427743881741941),
+    (0.9747285559713095, 0.02853138862893356), (0.9951872199970213, 0.01234122979998869),
+)  # fmt: skip
+
 
 def mean_width(thickness_normal: float, thickness_in_plane: float) -> float:
     """Return the caliper width [m] of a rectangular section, averaged over directions: perimeter/π.
@@ -53,9 +64,10 @@ def chain_mean_width(pitch: float) -> float:
     the excluded volume. The pitch is the distance of neighbouring spheres over their diameter [1], below √2, from which
     on chains pass through each other.
     """
-    nodes, weights = np.polynomial.legendre.leggauss(24)
+    half = np.array(GAUSS).T
+    nodes, weights = np.concatenate([half[:, ::-1] * [[-1.0], [1.0]], half], axis=1)
     angles = math.pi / 4 * (nodes + 1)
-    angle_weights = weights * np.sin(angles) ** 2
+    angle_weights = weights * np.array([math.sin(angle) ** 2 for angle in angles])
     phases = pitch * nodes / 2
     spheres = pitch * np.arange(-3, 4)
     along = (phases[:, None] + spheres).reshape(24, 1, 7, 1)
@@ -64,7 +76,8 @@ def chain_mean_width(pitch: float) -> float:
     for angle, weight in zip(angles, angle_weights / angle_weights.sum(), strict=True):
         squared = along**2 + across**2 - 2 * along * across * math.cos(angle)
         nearest = np.minimum(squared.min(axis=(2, 3)), 1.0)
-        total += weight * float(weights @ np.sqrt(1 - nearest) @ weights) / 4
+        rows = (weights[:, None] * np.sqrt(1 - nearest)).T * weights[:, None]
+        total += weight * math.fsum(map(math.fsum, rows)) / 4
     return total
 
 

@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array, Numbers
 from dem.body.kinds import Body
-from dem.body.linear import applied, eigen_symmetric
+from dem.body.linear import applied, eigen_symmetric, turned
+from dem.body.loops import Curves, bars_of, loops_of
 from dem.body.particle import Boxes
 from dem.errors import RunError
 
@@ -50,12 +51,16 @@ def place_layer(
     rng: np.random.Generator,
     narrower: Callable[[Array], Array] | None = None,
     thickest: float = 0.0,
+    curves: Sequence[Array] = (),
+    thinnest: float = 0.0,
 ) -> Poses:
-    """Return random poses of `count` bodies without overlap, in a slab of a cylinder.
+    """Return random poses of `count` bodies without overlap and without links, in a slab of a cylinder.
 
     Orientations are uniform over all rotations, centres uniform over the cylinder's section, and heights of the lowest
-    points uniform over the slab. Poses that overlap are drawn again. A slab that is too full is made higher; RunError
-    if bodies still overlap after it was made higher `MOST_GROWTH` times.
+    points uniform over the slab. Poses that overlap are drawn again, and so are poses in which closed curves of two
+    bodies are linked, with a linking number other than 0, see `dem.body.loops`: no pour links them, and nothing parts
+    them. A slab that is too full is made higher; RunError if there is still no room after it was made higher
+    `MOST_GROWTH` times.
 
     Args:
         bodies: one body, which is placed `count` times, or `count` bodies.
@@ -66,6 +71,8 @@ def place_layer(
         narrower: function from heights (n,) to inner radii (n,) of the cylinder [m], which must not increase with
             height; None: `radius` everywhere.
         thickest: radius of the largest obstacles, if it is above the radii of all `bodies` [m].
+        curves: corners (n, 3) of closed curves of bodies that are already there [m].
+        thinnest: diameter of the thinnest bar [m], which decides what counts as closed, see `loops_of`.
     """
     each = bodies if isinstance(bodies, Sequence) else [bodies] * count
     thickest = max(thickest, *(body.radius for body in each))
@@ -74,6 +81,8 @@ def place_layer(
     widest = radius - margin
     # Trees of spheres, each smaller than the one before it, so that a new body is not sorted in among all.
     trees = [cKDTree(obstacles)] if len(obstacles) else []
+    known = {id(body): (bars_of(body), loops_of(body, thinnest=thinnest)) for body in each}
+    present = Curves(curves)
     positions: list[Array] = []
     rotations: list[Rotation] = []
     increases = 0
@@ -81,7 +90,8 @@ def place_layer(
         particle = each[len(positions)]
         for _ in range(ATTEMPTS):
             rotation = Rotation.random(random_state=rng)
-            spheres = rotation.apply(particle.centres)
+            turn = rotation.as_matrix()
+            spheres = turned(turn, particle.centres)
             distance, angle = radius * math.sqrt(rng.random()), 2 * math.pi * rng.random()
             lift = rng.random()
             lowest = spheres[:, 2].min() - particle.radius
@@ -95,6 +105,11 @@ def place_layer(
                 continue
             if any(tree.query(spheres, distance_upper_bound=spacing)[0].min() < spacing for tree in trees):
                 continue
+            bars, loops = known[id(particle)]
+            corners = [applied(turn, loop.corners(bars)) + centre for loop in loops]
+            if present.linked(corners):
+                continue
+            present.add(corners)
             positions.append(centre)
             rotations.append(rotation)
             while trees and trees[-1].n <= len(spheres):

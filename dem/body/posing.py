@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from dem.arrays import Array
 from dem.body.bars import JOINED
 from dem.body.kinds import Kind
-from dem.body.linear import matrix_product
+from dem.body.linear import by_element, dot, matrix_product
 from dem.body.linkage import Joint, Linkage
 from dem.body.particle import Particle
 from dem.body.placement import Bent, fitted
@@ -68,7 +68,7 @@ def _directed(segments: Array, local: Array, *, flip: bool) -> Array:
         for k in sorted(todo):
             apart = np.linalg.norm(local[j][:, None] - local[k], axis=-1)
             a, b = np.unravel_index(apart.argmin(), apart.shape)
-            if apart[a, b] > JOINED * np.linalg.norm(local[j, 1] - local[j, 0]):
+            if apart[a, b] > JOINED * math.dist(*local[j]):
                 continue
             ways = np.linalg.norm(found[k] - found[j, a], axis=-1)
             found[k] = found[k, ::-1] if ways[1 - b] < ways[b] else found[k]
@@ -119,12 +119,12 @@ def _of_bent(kind: Kind, segments: Array) -> Pose:
         raise InputError(f"{_lengths(lengths, own)} (within {_allowed(kind)})")
     tangents = edges / lengths[:, None]
     if kind.filament is not None:
-        turns = np.arccos(np.clip((tangents[1:] * tangents[:-1]).sum(axis=1), -1, 1))
+        turns = by_element(math.acos, np.clip((tangents[1:] * tangents[:-1]).sum(axis=1), -1, 1))
         if turns.max() > SHARPEST:
             k = int(turns.argmax())
             raise InputError(f"it turns by {math.degrees(turns[k]):.0f}° at point {k + 1}; at most 150° are possible")
         masses = kind.filament.masses
-        return Pose(masses @ points / masses.sum(), np.eye(3), Bent(points))
+        return Pose(_mean(points, masses), np.eye(3), Bent(points))
     assert kind.linkage is not None
     frames, angles, off = _frames(kind.linkage, tangents)
     worst = int(off.argmax())
@@ -135,7 +135,12 @@ def _of_bent(kind: Kind, segments: Array) -> Pose:
         )
     masses = np.array([link.mass for link in kind.linkage.links])
     middles = (points[1:] + points[:-1]) / 2
-    return Pose(masses @ middles / masses.sum(), np.eye(3), Bent(middles, frames, angles))
+    return Pose(_mean(middles, masses), np.eye(3), Bent(middles, frames, angles))
+
+
+def _mean(places: Array, masses: Array) -> Array:
+    """Return the mean place (3,) of places (n, 3) [m], weighted by masses (n,)."""
+    return np.asarray((masses[:, None] * places).sum(axis=0) / masses.sum())
 
 
 def _frames(linkage: Linkage, tangents: Array) -> tuple[Array, Array, Array]:
@@ -164,18 +169,18 @@ def _frames(linkage: Linkage, tangents: Array) -> tuple[Array, Array, Array]:
 def _across(tangent: Array) -> Array:
     """Return a frame (3, 3) with x along a unit vector."""
     least = np.eye(3)[np.abs(tangent).argmin()]
-    z = least - (least @ tangent) * tangent
-    z /= np.linalg.norm(z)
+    z = least - dot(least, tangent) * tangent
+    z /= math.hypot(*z)
     return np.stack([tangent, np.cross(z, tangent), z], axis=1)
 
 
 def _followed(joints: Sequence[Joint], tangents: Array, frame: Array) -> tuple[Array, Array, Array]:
     frames, angles, off = [frame], np.zeros((len(joints), 3)), np.zeros(len(joints))
     for k, (joint, tangent) in enumerate(zip(joints, tangents[1:], strict=True)):
-        wanted = frames[-1].T @ tangent
+        wanted = matrix_product(frames[-1].T, tangent[:, None])[:, 0]
         own, turn = _turned(joint, wanted)
         angles[k, : len(own)] = own
-        off[k] = math.atan2(float(np.linalg.norm(np.cross(turn[:, 0], wanted))), float(turn[:, 0] @ wanted))
+        off[k] = math.atan2(math.hypot(*np.cross(turn[:, 0], wanted)), dot(turn[:, 0], wanted))
         frames.append(matrix_product(frames[-1], turn))
     return np.array(frames), angles, off
 
@@ -186,20 +191,20 @@ def _turned(joint: Joint, wanted: Array) -> tuple[list[float], Array]:
     axes = [np.array(axis) for axis in joint.axes]
     if len(axes) == 3:
         normal, cosine = np.cross(x, wanted), float(wanted[0])
-        sine = float(np.linalg.norm(normal))
+        sine = math.hypot(*normal)
         # Straight back: about the first axis across the link.
         direction = normal / sine if sine > 1e-12 else np.array([0.0, 0.0, 1.0])
         vector = math.atan2(sine, cosine) * direction
-        return [float(vector @ axis) for axis in axes], Rotation.from_rotvec(vector).as_matrix()
+        return [dot(vector, axis) for axis in axes], Rotation.from_rotvec(vector).as_matrix()
     if len(axes) == 1:
         angle = _about(axes[0], x, wanted)
         return [angle], Rotation.from_rotvec(angle * axes[0]).as_matrix()
     # The first axis keeps its part of the direction, which the second one must give.
     first, second = axes
     along = second * second[0]
-    a, b, c = (x - along) @ first, np.cross(second, x) @ first, along @ first
+    a, b, c = (dot(each, first) for each in (x - along, np.cross(second, x), along))
     size, phase = math.hypot(a, b), math.atan2(b, a)
-    reach = math.acos(min(1.0, max(-1.0, (float(wanted @ first) - c) / size))) if size > 1e-12 else 0.0
+    reach = math.acos(min(1.0, max(-1.0, (dot(wanted, first) - c) / size))) if size > 1e-12 else 0.0
     found = []
     for angle in (math.remainder(phase + sign * reach, 2 * math.pi) for sign in (1, -1)):
         inner = Rotation.from_rotvec(angle * second).as_matrix()
@@ -210,5 +215,5 @@ def _turned(joint: Joint, wanted: Array) -> tuple[list[float], Array]:
 
 def _about(axis: Array, start: Array, wanted: Array) -> float:
     """Return the angle [rad] about an axis (3,) by which a direction comes nearest to another one."""
-    across = start - axis * (axis @ start)
-    return math.atan2(float(wanted @ np.cross(axis, start)), float(wanted @ across))
+    across = start - axis * dot(axis, start)
+    return math.atan2(dot(wanted, np.cross(axis, start)), dot(wanted, across))

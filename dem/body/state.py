@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, Self
@@ -11,7 +12,7 @@ import numpy as np
 from dem.arrays import Array, Numbers
 from dem.body.filament import Filament
 from dem.body.kinds import Kind, Mixture, padded
-from dem.body.linear import matrix_product
+from dem.body.linear import by_element, matrix_product
 from dem.body.particle import LINKS, Boxes, Particle
 from dem.errors import InputError
 
@@ -477,7 +478,7 @@ class State:
             [np.einsum("ni,ni->n", self.link_rotations[:, barb, :, 0], self.link_rotations[:, 1, :, k]) for k in (0, 1)]
             for barb in (0, 2)
         )
-        return np.stack([np.arctan2(across1, -along1), np.arctan2(across2, along2)], axis=1)
+        return by_element(math.atan2, np.stack([across1, across2], axis=1), np.stack([-along1, along2], axis=1))
 
     def spheres(self, particle: Particle, which: Numbers | None = None) -> Array:
         """Return (N, S, 3) centres of all spheres [m], or (N, n, 3) of the n spheres with numbers `which`."""
@@ -520,3 +521,11 @@ def spheres_of(state: PileState, model: Particle | Mixture) -> Array:
         assert state.bodies is not None  # a pile of these kinds has no smarticles
         return state.bodies.spheres()
     return state.smarticles.spheres(model)
+
+
+def bars_by_body(state: PileState) -> list[Array]:
+    """Return both ends (S, 2, 3) of the S bars, or links, of each body [m]."""
+    if state.bodies is None:
+        vertices = state.smarticles.vertices
+        return list(np.stack([vertices[:, :-1], vertices[:, 1:]], axis=2))
+    return np.split(state.bodies.segments, np.flatnonzero(np.diff(state.bodies.body)) + 1)[: state.count]

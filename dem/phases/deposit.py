@@ -8,8 +8,10 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from dem.arrays import Array, Flags
+from dem.body.loops import curves_of
 from dem.body.placement import place_layer
-from dem.body.state import spheres_of
+from dem.body.state import PileState, spheres_of
 from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.phases.phase import (
@@ -24,6 +26,7 @@ from dem.phases.phase import (
     has_settled,
     waits_in_vain,
 )
+from dem.setting.container import Cylinder
 from dem.setting.part import Part, Speed
 
 # Time after which a layer must have landed, or lose energy: at least 2 s, and 10 times that of a fall √(2h/g) over the
@@ -34,10 +37,10 @@ LAYER_SECONDS = 0.125  # s, typical time between two layers of a pour; measured 
 
 
 class Deposit(Part, Phase):
-    """Pour bodies in layers of random poses without overlaps, then wait until the pile settles.
+    """Pour bodies in layers of random poses without overlaps or links, then wait until the pile settles.
 
     A layer is poured just above the pile after the previous layer has landed. If `every_s` is given, layers are poured
-    from the top of the wall at this interval.
+    from the top of the wall at this interval. Closed bodies, such as rings, are never linked with each other.
     """
 
     begins: ClassVar[bool] = True
@@ -159,6 +162,8 @@ class Deposit(Part, Phase):
             rng=rng,
             narrower=cylinder.inner_radii if cylinder.upper else None,
             thickest=particle.radius,
+            curves=_curves(scene, cylinder, state, near),
+            thinnest=particle.diameter,
         )
         highest = poses.positions[:, 2].max() + particle.reach
         if highest > cylinder.height:
@@ -173,3 +178,16 @@ class Deposit(Part, Phase):
         engine.add(poses, speed=self.thrown_at_m_per_s)
         memory.update(left=memory["left"] - size, layer=size, random=rng.bit_generator.state)
         begin_wait(memory)
+
+
+def _curves(scene: SceneView, cylinder: Cylinder, state: PileState, which: Flags) -> list[Array]:
+    """Return the corners (n, 3) [m] of all closed curves that are there.
+
+    They are those of bodies, `which` (N,), and bars of hooks that end at the wall, too near for the thinnest bar.
+    """
+    thinnest = scene.model.diameter
+    curves = curves_of(state, scene.bodies, thinnest=thinnest)
+    found = [curve for own, wanted in zip(curves, which, strict=True) if wanted for curve in own]
+    for cross in scene.hooks.crosses if scene.hooks else ():
+        found += cross.closed(wall=float(cylinder.inner_radii(np.array([cross.height]))[0]), narrow=thinnest)
+    return found

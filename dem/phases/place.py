@@ -1,7 +1,7 @@
 """The phase that puts bodies at poses from a file."""
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array, Numbers
 from dem.body.kinds import Kind, bodies_of
+from dem.body.loops import Curves, curves_of
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.posing import Pose, posed
@@ -102,6 +103,22 @@ class Place(Part, Phase):
             yield f"phases.0.{error}"
             return
         yield from _misplaced(scene, poses, self._bodies)
+
+    def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
+        if not Path(self.file).exists():
+            return ()
+        present, linked = Curves(), []
+        curves = curves_of(_state(scene, self._poses(scene)), scene.bodies, thinnest=scene.model.diameter)
+        for body, own in zip(self._bodies, curves, strict=True):
+            linked += [body.name] if present.linked(own) else []
+            present.add(own)
+        if not linked:
+            return ()
+        others = f" and {len(linked) - 1} others" if len(linked) > 1 else ""
+        return (
+            f"phases.{index}.file: closed bodies are linked, {linked[0]}{others} with bodies before; nothing parts "
+            "them, so move them apart in the file unless chain mail is wanted",
+        )
 
     def first_memory(self, scene: SceneView) -> Memory:
         return {"put": False}

@@ -17,6 +17,7 @@ import numpy as np
 from pydantic import Field, ModelWrapValidatorHandler, field_validator, model_validator
 
 from dem.arrays import Array, Flags
+from dem.body.linear import by_element
 from dem.body.placement import Poses, fitted_poses
 from dem.engine.interface import Engine
 from dem.errors import InputError, RunError, shown
@@ -360,4 +361,4 @@ def _angles(taken: Taken) -> Array:
         np.einsum("ni,ni->n", axis, barb) / np.linalg.norm(axis, axis=1) / np.linalg.norm(barb, axis=1)
         for axis, barb in ((-along, tip_1 - hinge_1), (along, tip_2 - hinge_2))
     ]
-    return np.asarray(np.degrees(np.arccos(np.clip(cosines, -1, 1))).T)
+    return np.asarray(np.degrees(by_element(math.acos, np.clip(cosines, -1, 1))).T)

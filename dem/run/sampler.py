@@ -140,10 +140,10 @@ class Sampler:
         pull = forces.sum(axis=0) - grips.weights.sum() * up
         row |= {"grip_moved_force_N": forces[-1], "grip_moved_count": grips.counts[-1]}
         if len(forces) == 1:
-            return row | {"grip_fixed_force_N": np.zeros(3), "elongation_m": np.linalg.norm(moved[0])}, pull
+            return row | {"grip_fixed_force_N": np.zeros(3), "elongation_m": math.hypot(*moved[0])}, pull
         row |= {"grip_fixed_force_N": forces[-2], "grip_fixed_count": grips.counts[-2]}
-        row["elongation_m"] = np.linalg.norm(moved[-1] - moved[-2])
-        return row | {"grip_distance_m": np.linalg.norm(np.subtract(*grips.places[-2:]))}, pull
+        row["elongation_m"] = math.hypot(*(moved[-1] - moved[-2]))
+        return row | {"grip_distance_m": math.dist(*grips.places[-2:])}, pull
 
     def _strain_row(self, engine: Engine, state: PileState) -> dict[str, Any]:
         strings, none = engine.strings, np.full(3, math.nan)

@@ -118,3 +118,18 @@ class Cross:
             ]
             points += list(itertools.product(*axes))
         return np.asarray(np.array(points) + np.array([0.0, 0.0, self.height]))
+
+    def closed(self, *, wall: float, narrow: float) -> list[Array]:
+        """Return closed curves (4, 3) [m] along bars that end at a wall, closed far outside of it.
+
+        Gaps between these bars' ends and the wall, which has the radius `wall`, are below `narrow` [m].
+        """
+        found = []
+        for bar in self.bars:
+            (x, y), (a, b, _), far = bar.middle, bar.half, 10 * wall
+            if wall - math.hypot(abs(x) + a, abs(y) + b) < narrow:
+                ends = [[-far, y], [far, y]] if a > b else [[x, -far], [x, far]]
+                found.append(
+                    np.array([[*ends[0], self.height], [*ends[1], self.height], [*ends[1], -far], [*ends[0], -far]])
+                )
+        return found

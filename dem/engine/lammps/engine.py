@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from dem.arrays import Array, Numbers
 from dem.body.chain import Tie
 from dem.body.kinds import Kind, Mixture, bodies_of, body_of
+from dem.body.linear import matrix_product
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.state import PileState, RigidState, State, spheres_of
@@ -217,12 +218,12 @@ class LammpsEngine:
         if self._frames is None:
             # The dump of the set-up, of known poses, gives LAMMPS's principal axes.
             own = _turns(self._read(self.steps))
-            self._frames = np.swapaxes(own, 1, 2) @ self._moving.turns
+            self._frames = matrix_product(np.swapaxes(own, 1, 2), self._moving.turns)
         self._fresh = False
         rows = self._read(target)
         self._moving = Moving(
             positions=rows[:, 1:4],
-            turns=_turns(rows) @ self._frames,
+            turns=matrix_product(_turns(rows), self._frames),
             velocities=rows[:, 4:7],
             spins=rows[:, 11:14],
             momenta=rows[:, 14:17],

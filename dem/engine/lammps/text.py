@@ -12,6 +12,7 @@ import numpy as np
 
 from dem.arrays import Array
 from dem.body.kinds import Kind, Mixture
+from dem.body.linear import eigen_symmetric, matrix_product, transformed
 from dem.body.particle import Particle
 from dem.physics.contact import ContactLaw
 from dem.setting.container import Cylinder
@@ -19,6 +20,7 @@ from dem.setting.container import Cylinder
 NEVER_PULLS = "limit_damping"
 """Keyword of a contact law: the normal force is zero where spring and dashpot together would pull."""
 SKIN = 0.2  # distance between spheres up to which they are listed as neighbours, in sphere diameters
+FLAT = 1e-12  # of the largest eigenvalue: below it, spheres lie in a plane or on a line
 WRITTEN = "mol x y z vx vy vz quatw quati quatj quatk omegax omegay omegaz angmomx angmomy angmomz fx fy fz"
 """Quantities that LAMMPS writes to a dump file for each body."""
 
@@ -51,7 +53,11 @@ def sphere_masses(body: Particle | Kind) -> Array:
     rows = np.concatenate([np.ones((1, count)), body.centres.T / body.size])
     wanted = np.array([body.mass, 0.0, 0.0, 0.0])
     equal = np.full(count, body.mass / count)
-    return np.asarray(equal + np.linalg.pinv(rows) @ (wanted - rows @ equal))
+    # Of a flat body no mass moves the centre out of its plane.
+    values, vectors = (found[0] for found in eigen_symmetric(matrix_product(rows, rows.T)[None]))
+    inverses = np.divide(1.0, values, out=np.zeros(4), where=values > FLAT * values.max())
+    part = transformed(vectors, inverses * transformed(vectors.T, wanted - transformed(rows, equal)))
+    return np.asarray(equal + transformed(rows.T, part))
 
 
 def sphere_lines(
@@ -98,7 +104,7 @@ def body_lines(bodies: Sequence[Particle | Kind], moving: Moving) -> Iterator[st
     image flags of a body.
     """
     inertias = np.array([np.diag(body.inertia) for body in bodies]).reshape(-1, 3, 3)
-    tensors = moving.turns @ inertias @ np.swapaxes(moving.turns, 1, 2)
+    tensors = matrix_product(matrix_product(moving.turns, inertias), np.swapaxes(moving.turns, 1, 2))
     moments = tensors[:, (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)]
     yield str(len(moving.positions))
     columns = (moving.positions, moments, moving.velocities, moving.momenta)

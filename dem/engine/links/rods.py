@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.filament import Filament, PreferredCurvature
+from dem.body.linear import by_element
 from dem.engine.links.arrays import Filaments
 from dem.engine.links.motion import bending
 
@@ -42,8 +43,9 @@ def wave_of(filament: Filament, curvature: PreferredCurvature | None) -> Array:
     wave = np.zeros((filament.nodes, 3))
     if curvature is not None:
         # A curvature 1/R turns a segment by the angle ℓ/R, and κ is twice the tangent of half of it.
-        wave[1:-1, 0] = 2 * np.tan(np.asarray(curvature.amplitudes) * filament.segment_length / 2)
-        wave[1:-1, 1], wave[1:-1, 2] = np.cos(curvature.phases), np.sin(curvature.phases)
+        wave[1:-1, 0] = 2 * by_element(math.tan, np.asarray(curvature.amplitudes) * filament.segment_length / 2)
+        phases = np.asarray(curvature.phases)
+        wave[1:-1, 1], wave[1:-1, 2] = by_element(math.cos, phases), by_element(math.sin, phases)
     return wave
 
 

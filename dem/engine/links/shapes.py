@@ -200,7 +200,7 @@ def rigid_shape(bars: Bars, rows: int = 1, radius: float | None = None) -> Shape
         lines=_lines(np.concatenate([points[:, 0], points[:, 1] - points[:, 0]], axis=1), radius),
         link=np.repeat(np.arange(len(starts)), rows),
         # Strands of bars that are twisted against each other do not meet, and count apart.
-        shared=(later @ [AT_START, AT_END]).astype(np.uint8),
+        shared=(later * [AT_START, AT_END]).sum(axis=1).astype(np.uint8),
         effective_mass=bars.effective_mass,
     )
 

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from dem.arrays import Array
 from dem.body.kinds import Kind, Mixture, body_of
+from dem.body.linear import eigen_symmetric, matrix_product, solved, transformed
 from dem.body.particle import LINKS, Particle
 from dem.body.placement import Poses
 from dem.body.state import PileState, RigidState, State
@@ -202,7 +203,7 @@ class Assembly:
         assert self._hinge_law is not None  # the engine was built for scenes that never articulate
         boxes, state = self._particle.boxes, self.state()
         tensors, arms = _tensors(state)
-        spins = np.linalg.solve(tensors, self._angular_momenta()[..., None])[..., 0]
+        spins = solved(tensors, self._angular_momenta())
         inertias = boxes.link_inertias
         nodes: list[list[list[int]]] = []
         self._dissolve()
@@ -221,7 +222,7 @@ class Assembly:
                     position=state.link_positions[k, link],
                     rotation=rotation,
                     velocity=state.velocities[k] + np.cross(spins[k], arms[k, link]),
-                    angular_momentum=rotation @ (inertias[link] * (rotation.T @ spins[k])),
+                    angular_momentum=transformed(rotation, inertias[link] * transformed(rotation.T, spins[k])),
                 )
         self.hinges = Hinges(self._yade, self._hinge_law, nodes, state.angles)
         self.hinges.make(self._strengths)
@@ -239,8 +240,8 @@ class Assembly:
         if self._planar:
             moments, axes = tensors[:, [0, 1, 2], [0, 1, 2]], np.tile(np.eye(3), (state.count, 1, 1))
         else:
-            moments, axes = np.linalg.eigh(tensors)
-            axes[..., 0] *= np.linalg.det(axes)[:, None]
+            moments, axes = eigen_symmetric(tensors)
+            axes[..., 0] = np.cross(axes[..., 1], axes[..., 2])  # right-handed
         before = state.kinetic_energy
         spheres = state.spheres(self._particle) - state.positions[:, None]
         self.hinges.remove()
@@ -249,7 +250,7 @@ class Assembly:
         for k in range(state.count):
             self._clump(
                 members=self._spheres[k],
-                local=spheres[k] @ axes[k],
+                local=matrix_product(spheres[k], axes[k]),
                 mass=boxes.mass,
                 inertia=moments[k],
                 position=state.positions[k],
@@ -385,7 +386,7 @@ def clump(
     principal = state.ori
     x, y, z, w = Rotation.from_matrix(rotation).as_quat()
     turned = yade.quaternion(w, x, y, z)
-    spin = rotation @ ((rotation.T @ angular_momentum) / inertia)
+    spin = transformed(rotation, transformed(rotation.T, angular_momentum) / inertia)
     state.ori = turned * principal
     state.pos = vector(*position)
     state.vel = vector(*velocity)
@@ -393,7 +394,7 @@ def clump(
     state.angMom = vector(*angular_momentum)
     if planar:
         state.blockedDOFs = "zXY"
-    for member, arm in zip(members, local @ rotation.T, strict=True):
+    for member, arm in zip(members, matrix_product(local, rotation.T), strict=True):
         own = omega.bodies[member].state
         own.pos, own.ori = vector(*(position + arm)), turned
         # Contact laws read the members' own velocities, before the integrator has moved them for the first time.

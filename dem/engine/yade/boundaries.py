@@ -9,6 +9,7 @@ import numpy as np
 
 from dem.arrays import Array
 from dem.body.forces import CHANNEL, FLOOR, LOWER_HOOK, WALL
+from dem.body.linear import by_element
 from dem.engine.yade.construction import WALL_MATERIAL
 from dem.engine.yade.library import Yade, rows_of
 from dem.errors import RunError
@@ -232,7 +233,7 @@ def _ring(cylinder: Cylinder, radius: float) -> Array:
     """Return (n + 1, 2) corners of the wall's polygon [m]; the first corner is repeated at the end."""
     corner = cylinder.corner_radius_of(radius)
     angles = 2 * math.pi * np.arange(cylinder.facets + 1) / cylinder.facets
-    return np.stack([corner * np.cos(angles), corner * np.sin(angles)], axis=1)
+    return np.stack([corner * by_element(math.cos, angles), corner * by_element(math.sin, angles)], axis=1)
 
 
 def _band(yade: Yade, one: tuple[Array, float], other: tuple[Array, float]) -> Iterator[Any]:

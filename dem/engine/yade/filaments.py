@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 from dem.arrays import Array
 from dem.body.filament import Activity, Filament, FilamentEnergies
 from dem.body.kinds import Mixture
+from dem.body.linear import applied, by_element, dot
 from dem.body.linkage import Undulation
 from dem.body.placement import Poses
 from dem.body.state import FilamentState, PileState
@@ -118,12 +119,13 @@ class YadeFilaments(Assembly):
             # Bonds are made in the shape at rest, then nodes are moved to the shape in which filaments are poured:
             # both are arcs in one plane, of equal angles between neighbouring segments.
             first, second, normal = frames[0][:, 0], frames[1][:, 0], frames[0][:, 2]
-            poured = math.atan2(float(np.cross(first, second) @ normal), float(first @ second))
+            poured = math.atan2(dot(np.cross(first, second), normal), dot(first, second))
             rest = 0.0 if filament.curvature is None else float(filament.curvature.amplitudes) * filament.segment_length
             headings = rest * np.arange(filament.nodes - 1)[:, None]
-            edges = np.cos(headings) * first + np.sin(headings) * np.cross(normal, first)
+            edges = by_element(math.cos, headings) * first + by_element(math.sin, headings) * np.cross(normal, first)
             nodes = self._chain(filament, np.cumsum([np.zeros(3), *(filament.segment_length * edges)], axis=0))
-            places = np.concatenate([kind.bars.ends[:, 0], kind.bars.ends[-1:, 1]]) @ rotation.as_matrix().T + position
+            local = np.concatenate([kind.bars.ends[:, 0], kind.bars.ends[-1:, 1]])
+            places = applied(rotation.as_matrix(), local) + position
             angles = (np.arange(filament.nodes) - 0.5) * (poured - rest)
             turns = (rotation * Rotation.from_rotvec(angles[:, None] * normal)).as_quat()
             for node, place, (x, y, z, w) in zip(nodes, places, turns, strict=True):

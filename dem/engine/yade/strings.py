@@ -13,6 +13,7 @@ import numpy as np
 
 from dem.arrays import Array
 from dem.body.chain import Tie
+from dem.body.linear import transformed
 from dem.engine.yade.assembly import Assembly
 from dem.engine.yade.library import Yade, rows_of
 from dem.physics.contact import StringLaw
@@ -55,7 +56,7 @@ class YadeStrings:
             point = np.array([tie.along, 0.0, 0.0])
             body, arm = self._assembly.anchor(tie.smarticle, tie.link, point)
             position = state.link_positions[tie.smarticle, tie.link]
-            position = position + state.link_rotations[tie.smarticle, tie.link] @ point
+            position = position + transformed(state.link_rotations[tie.smarticle, tie.link], point)
             away = math.copysign(1.0, position[0])
             anchor = [float(position[0] + away * math.sqrt(law.length**2 - position[1] ** 2)), 0.0, 0.0]
             ends.append(End(body=body, arm=arm.tolist(), anchor=anchor, speed=away * speed))

@@ -1,5 +1,6 @@
 """Start poses from a file: what a scene checks before a run, its hash, and the copy in the run directory."""
 
+import itertools
 import re
 import shutil
 from pathlib import Path
@@ -12,6 +13,7 @@ from scenes import SMALL, changed
 
 from dem.errors import InputError
 from dem.phases.place import MOST_OVERLAP
+from dem.plan.outlook import warnings_of
 from dem.scene.reading import dump_scene, load_scene, parse_scene, scene_hash
 from dem.scene.scene import Scene
 
@@ -171,3 +173,27 @@ def test_flat_straight_bodies_of_several_strands_are_not_determined(tmp_path: Pa
     assert scene(tmp_path, particle=flat, **{"fidelity": {"base": "draft", "rows": 1}})
     message = "centre lines leave open how a straight body of several strands is turned about its length"
     assert re.search(message, refused(tmp_path, particle=flat, fidelity={"base": "draft", "rows": 2}))
+
+
+def test_closed_bodies_that_are_linked_are_accepted_and_named(tmp_path: Path) -> None:
+    square = np.array([[5, 5, 0], [-5, 5, 0], [-5, -5, 0], [5, -5, 0], [5, 5, 0]])
+    ring = {
+        "shape": "segments",
+        "points_m": (1e-3 * square[:4]).tolist(),
+        "pairs": [[k, (k + 1) % 4] for k in range(4)],
+        "diameter_m": D,
+    }
+    upright = square[:, [0, 2, 1]] + np.array([5, 0, 0])
+    for apart, number in ((0, 1), (20, 0)):
+        bars = [list(itertools.pairwise(points)) for points in (square, upright + np.array([apart, 0, 0]))]
+        rows = [
+            f"{body},{bar},{x},{y},{z + 10}"
+            for body, own in enumerate(bars)
+            for bar, ends in enumerate(own)
+            for x, y, z in ends
+        ]
+        (tmp_path / "poses.csv").write_text("body,bar,x [mm],y [mm],z [mm]\n" + "\n".join(rows) + "\n")
+        found = scene(tmp_path, particle=ring, **{"container.radius_m": 0.04, "count": 2})
+        warned = [text for text in warnings_of(found) if "linked" in text]
+        assert len(warned) == number
+        assert all(text.startswith("phases.0.file") for text in warned)
