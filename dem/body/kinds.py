@@ -141,13 +141,18 @@ class Kind:
         each = [np.repeat(self._stations(k) / lengths[k], self.rows) for k in range(len(lengths))]
         return np.concatenate(each)
 
+    @property
+    def offsets(self) -> Array:
+        """(rows,) offsets of the rows from a bar's axis, along its normal [m]; the outermost reach to its faces."""
+        reach = self.bars.thickness_normal / 2 - self.radius
+        return np.linspace(-reach, reach, self.rows) if self.rows > 1 else np.zeros(1)
+
     @cached_property
     def _layout(self) -> tuple[Array, Numbers]:
         bars, centres, links = self.bars, [], []
-        reach = bars.thickness_normal / 2 - self.radius if self.rows > 1 else 0.0
         for k, (ends, frame) in enumerate(zip(bars.ends, bars.frames, strict=True)):
             for station in self._stations(k):
-                for offset in np.linspace(-reach, reach, self.rows) if self.rows > 1 else (0.0,):
+                for offset in self.offsets:
                     centres.append(ends[0] + station * frame[:, 0] + offset * frame[:, 2])
                     links.append(k)
         return np.array(centres), np.array(links, dtype=np.int64)
@@ -160,6 +165,16 @@ class Kind:
     def links(self) -> Numbers:
         """(S,) number of the bar to which each sphere belongs."""
         return self._layout[1]
+
+    @cached_property
+    def outline(self) -> Array:
+        """(P, 3) places of spheres that reach as far as the body: `centres`, and ends of strands at joints [m].
+
+        Bars that are twisted against each other have strands at a joint where only its owner has spheres.
+        """
+        normals = self.bars.frames[:, None, None, :, 2]
+        ends = self.bars.ends[:, :, None] + self.offsets[:, None] * normals  # (bars, 2, rows, 3)
+        return np.concatenate([self.centres, ends[~self.bars.free].reshape(-1, 3)])
 
     @property
     def reach(self) -> float:
@@ -279,6 +294,16 @@ class Mixture:
     def reach(self) -> float:
         """Largest distance of a point of any body from the centre of mass of this body [m]."""
         return max(kind.reach for kind in self.kinds)
+
+    @cached_property
+    def radii(self) -> Array:
+        """(K,) radii of the spheres, or strands, of each kind [m]."""
+        return np.array([kind.radius for kind in self.kinds])
+
+    @cached_property
+    def outlines(self) -> Array:
+        """(K, P, 3) points `Kind.outline` of each kind in its frame [m]; shorter rows repeat the last point."""
+        return padded([kind.outline for kind in self.kinds])
 
     @cached_property
     def spheres(self) -> Array:

@@ -202,8 +202,11 @@ class RigidState(BarState):
         return self.spins[self.body]
 
     def spheres(self) -> Array:
-        local = self.mixture.spheres[self.kind]
-        return matrix_product(local, np.swapaxes(self.rotations, 1, 2)) + self.positions[:, None]
+        return self.placed(self.mixture.spheres)
+
+    def placed(self, points: Array) -> Array:
+        """Return (N, P, 3) places [m] of points (K, P, 3) in the frames of all kinds [m], those of each body's kind."""
+        return matrix_product(points[self.kind], np.swapaxes(self.rotations, 1, 2)) + self.positions[:, None]
 
     @cached_property
     def _own_spins(self) -> tuple[Array, Array]:
