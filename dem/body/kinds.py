@@ -57,6 +57,10 @@ class Body(Protocol):
         """Radius of the spheres [m]."""
 
     @property
+    def breadth(self) -> float:
+        """Extent of a bar across its axis, over all rows of its spheres, where it is largest [m]."""
+
+    @property
     def reach(self) -> float:
         """Largest distance of a point of bars or spheres from the centre of mass [m]."""
 
@@ -165,6 +169,10 @@ class Kind:
     def links(self) -> Numbers:
         """(S,) number of the bar to which each sphere belongs."""
         return self._layout[1]
+
+    @property
+    def breadth(self) -> float:
+        return float(np.ptp(self.offsets) + self.diameter)
 
     @cached_property
     def outline(self) -> Array:

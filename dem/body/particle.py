@@ -337,6 +337,10 @@ class Particle:
         return self.chain.diameter / 2
 
     @property
+    def breadth(self) -> float:
+        return float(max(np.ptp(self._rows), np.ptp(self._sides)) + self.diameter)
+
+    @property
     def reach(self) -> float:
         spheres = float(np.linalg.norm(self.centres, axis=1).max()) + self.radius
         half = math.hypot(self.boxes.thickness_normal, max(self.boxes.thicknesses_in_plane)) / 2
