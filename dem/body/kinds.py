@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from dem.arrays import Array, Numbers
-from dem.body.bars import Bars
+from dem.body.bars import JOINED, Bars
 from dem.body.filament import Filament
 from dem.body.linkage import Linkage
 from dem.body.particle import HINGE_CLEARANCE, Particle, smallest_effective_mass
@@ -51,6 +51,13 @@ class Body(Protocol):
     @property
     def centres(self) -> Array:
         """(S, 3) centres of the spheres in the body's frame [m]."""
+
+    @property
+    def outline(self) -> Array:
+        """(P, 3) centres of spheres, of that radius, that reach as far as the body: `centres`, and ends of strands [m].
+
+        Coordinates are in the body's frame.
+        """
 
     @property
     def radius(self) -> float:
@@ -176,13 +183,12 @@ class Kind:
 
     @cached_property
     def outline(self) -> Array:
-        """(P, 3) places of spheres that reach as far as the body: `centres`, and ends of strands at joints [m].
-
-        Bars that are twisted against each other have strands at a joint where only its owner has spheres.
-        """
         normals = self.bars.frames[:, None, None, :, 2]
         ends = self.bars.ends[:, :, None] + self.offsets[:, None] * normals  # (bars, 2, rows, 3)
-        return np.concatenate([self.centres, ends[~self.bars.free].reshape(-1, 3)])
+        joined = ends[~self.bars.free].reshape(-1, 3)
+        # Only of bars that are twisted against each other do strands end where the joint's owner has no spheres.
+        off = np.abs(joined[:, None] - self.centres).max(axis=-1).min(axis=1, initial=np.inf)
+        return np.concatenate([self.centres, joined[off > JOINED * self.size]])
 
     @property
     def reach(self) -> float:

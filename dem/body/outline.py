@@ -13,15 +13,20 @@ from dem.body.particle import Particle
 from dem.body.state import PileState, RigidState, spheres_of
 
 
-def tops_of(state: PileState, model: Particle | Mixture) -> Array:
-    """Return (N,) heights of the highest points of the bodies' surfaces [m].
+def outline_of(state: PileState, model: Particle | Mixture) -> Array:
+    """Return (N, P, 3) centres of spheres that reach as far as the bodies in every direction [m].
 
-    They are exact for strands, whose highest points are at their ends, and for spheres. Strands that meet at a joint
-    count in a body of spheres, too.
+    They are all spheres of a body, and all ends of its strands. In a mixture shorter rows repeat the last point.
     """
+    if isinstance(model, Mixture) and isinstance(state, RigidState):
+        return state.placed(model.outlines)
+    return spheres_of(state, model)
+
+
+def tops_of(state: PileState, model: Particle | Mixture) -> Array:
+    """Return (N,) heights of the highest points of the bodies' surfaces [m]."""
+    highest = outline_of(state, model)[..., 2].max(axis=1)
     if isinstance(model, Particle):
-        return np.asarray(spheres_of(state, model)[..., 2].max(axis=1) + model.radius)
-    bodies = state.bodies
-    assert bodies is not None  # a pile of a mixture has no smarticles
-    points = bodies.placed(model.outlines) if isinstance(bodies, RigidState) else bodies.spheres()
-    return np.asarray(points[..., 2].max(axis=1) + model.radii[bodies.kind])
+        return np.asarray(highest + model.radius)
+    assert state.bodies is not None  # a pile of these kinds has no smarticles
+    return np.asarray(highest + model.radii[state.bodies.kind])

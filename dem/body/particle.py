@@ -322,6 +322,10 @@ class Particle:
         return self._layout[0]
 
     @property
+    def outline(self) -> Array:
+        return self.centres
+
+    @property
     def links(self) -> Numbers:
         """(S,) int64: link of each sphere; 0 barb 1, 1 middle link, 2 barb 2."""
         return self._layout[1]

@@ -81,7 +81,7 @@ def place_layer(
         particle = each[len(positions)]
         for _ in range(ATTEMPTS):
             rotation = Rotation.random(random_state=rng)
-            spheres = rotation.apply(particle.centres)
+            spheres = rotation.apply(particle.outline)
             distance, angle = radius * math.sqrt(rng.random()), 2 * math.pi * rng.random()
             lift = rng.random()
             lowest = spheres[:, 2].min() - particle.radius

@@ -8,9 +8,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from dem.body.outline import tops_of
+from dem.body.outline import outline_of, tops_of
 from dem.body.placement import place_layer
-from dem.body.state import spheres_of
 from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.phases.phase import (
@@ -156,7 +155,7 @@ class Deposit(Part, Phase):
             radius=float(cylinder.inner_radii(np.array([bottom]))[0]),
             bottom=bottom,
             height=slab,
-            obstacles=np.concatenate([spheres_of(state, particle)[near].reshape(-1, 3), *hooks]),
+            obstacles=np.concatenate([outline_of(state, particle)[near].reshape(-1, 3), *hooks]),
             rng=rng,
             narrower=cylinder.inner_radii if cylinder.upper else None,
             thickest=particle.radius,
