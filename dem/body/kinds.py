@@ -60,6 +60,10 @@ class Body(Protocol):
         """
 
     @property
+    def outline_links(self) -> Numbers:
+        """(P,) number of the link, or bar, of each point of `outline`."""
+
+    @property
     def radius(self) -> float:
         """Radius of the spheres [m]."""
 
@@ -182,13 +186,28 @@ class Kind:
         return float(np.ptp(self.offsets) + self.diameter)
 
     @cached_property
-    def outline(self) -> Array:
+    def _uncovered(self) -> tuple[Array, Numbers]:
+        """Ends (n, 3) of strands at joints, where no sphere is [m], and the number (n,) of the bar of each.
+
+        These are strands of bars that are twisted against each other, and of bars too short for a sphere. Where
+        bodies change their shape, the spheres of `BarState.spheres` alone count.
+        """
+        if self.bends:
+            return np.zeros((0, 3)), np.zeros(0, np.int64)
         normals = self.bars.frames[:, None, None, :, 2]
         ends = self.bars.ends[:, :, None] + self.offsets[:, None] * normals  # (bars, 2, rows, 3)
-        joined = ends[~self.bars.free].reshape(-1, 3)
-        # Only of bars that are twisted against each other do strands end where the joint's owner has no spheres.
-        off = np.abs(joined[:, None] - self.centres).max(axis=-1).min(axis=1, initial=np.inf)
-        return np.concatenate([self.centres, joined[off > JOINED * self.size]])
+        bars, sides = np.nonzero(~self.bars.free)
+        points, bars = ends[bars, sides].reshape(-1, 3), np.repeat(bars, self.rows)
+        off = np.abs(points[:, None] - self.centres).max(axis=-1).min(axis=1, initial=np.inf) > JOINED * self.size
+        return points[off], bars[off]
+
+    @cached_property
+    def outline(self) -> Array:
+        return np.concatenate([self.centres, self._uncovered[0]])
+
+    @property
+    def outline_links(self) -> Numbers:
+        return np.concatenate([self.links, self._uncovered[1]])
 
     @property
     def reach(self) -> float:

@@ -326,6 +326,10 @@ class Particle:
         return self.centres
 
     @property
+    def outline_links(self) -> Numbers:
+        return self.links
+
+    @property
     def links(self) -> Numbers:
         """(S,) int64: link of each sphere; 0 barb 1, 1 middle link, 2 barb 2."""
         return self._layout[1]
