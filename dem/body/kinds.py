@@ -182,8 +182,13 @@ class Kind:
         return self._layout[1]
 
     @property
+    def spread(self) -> float:
+        """Distance of the outermost rows from a bar's axis, along its normal [m]."""
+        return float(self.offsets[-1])
+
+    @property
     def breadth(self) -> float:
-        return float(np.ptp(self.offsets) + self.diameter)
+        return 2 * self.spread + self.diameter
 
     @cached_property
     def _uncovered(self) -> tuple[Array, Numbers]:
@@ -332,6 +337,11 @@ class Mixture:
     def radii(self) -> Array:
         """(K,) radii of the spheres, or strands, of each kind [m]."""
         return np.array([kind.radius for kind in self.kinds])
+
+    @cached_property
+    def spreads(self) -> Array:
+        """(K,) distance of the outermost rows from the axis of a bar of each kind, along its normal [m]."""
+        return np.array([kind.spread for kind in self.kinds])
 
     @cached_property
     def outlines(self) -> Array:

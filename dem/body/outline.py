@@ -1,8 +1,7 @@
 """Outline of bodies: the surface that touches others.
 
 A flat bar has several rows of spheres, or strands, side by side along its normal. The surfaces of the outermost ones
-are farther from the bar's axis than a radius. At a free end the surface ends at the tip, a radius nearer than a sphere
-about the tip would.
+are farther from the bar's axis than a radius.
 """
 
 import numpy as np
@@ -10,7 +9,9 @@ import numpy as np
 from dem.arrays import Array
 from dem.body.kinds import Mixture
 from dem.body.particle import Particle
-from dem.body.state import PileState, RigidState, spheres_of
+from dem.body.state import BarState, PileState, RigidState, spheres_of
+
+VERTEX_LINKS = [0, 1, 1, 2]  # link whose rows count at each vertex of a smarticle
 
 
 def outline_of(state: PileState, model: Particle | Mixture) -> Array:
@@ -24,9 +25,17 @@ def outline_of(state: PileState, model: Particle | Mixture) -> Array:
 
 
 def tops_of(state: PileState, model: Particle | Mixture) -> Array:
-    """Return (N,) heights of the highest points of the bodies' surfaces [m]."""
-    highest = outline_of(state, model)[..., 2].max(axis=1)
+    """Return (N,) heights that no point of each body's surface exceeds [m], for states of any bodies.
+
+    They are the heights of the highest points, except where this is a tip: strands and rows of spheres end at a tip,
+    but count here as if their last sphere were centred on it, so that the value is up to a radius too high.
+    """
     if isinstance(model, Particle):
-        return np.asarray(highest + model.radius)
-    assert state.bodies is not None  # a pile of these kinds has no smarticles
-    return np.asarray(highest + model.radii[state.bodies.kind])
+        smarticles = state.smarticles
+        aside = model.spread * np.abs(smarticles.link_rotations[..., 2, 2])
+        highest = smarticles.vertices[..., 2] + aside[:, VERTEX_LINKS]
+        return np.asarray(highest.max(axis=1) + model.radius)
+    bodies = state.bodies
+    assert isinstance(bodies, BarState)  # a pile of these kinds has no smarticles
+    aside = model.spreads[bodies.kind[bodies.body]] * np.abs(bodies.normals[:, 2])
+    return bodies.largest(bodies.segments[..., 2].max(axis=1) + aside) + model.radii[bodies.kind]

@@ -345,8 +345,13 @@ class Particle:
         return self.chain.diameter / 2
 
     @property
+    def spread(self) -> float:
+        """Distance of the outermost rows of spheres from a link's axis, along the normal [m]."""
+        return float(self._rows[-1])
+
+    @property
     def breadth(self) -> float:
-        return float(max(np.ptp(self._rows), np.ptp(self._sides)) + self.diameter)
+        return 2 * max(self.spread, self.boxes.bulge) + self.diameter
 
     @property
     def reach(self) -> float:

@@ -139,13 +139,13 @@ class BarState:
 
     @cached_property
     def tops(self) -> Array:
-        return self._largest(self.segments[..., 2].max(axis=1))
+        return self.largest(self.segments[..., 2].max(axis=1))
 
     @cached_property
     def speeds(self) -> Array:
-        return self._largest(np.linalg.norm(self.bar_velocities, axis=1))
+        return self.largest(np.linalg.norm(self.bar_velocities, axis=1))
 
-    def _largest(self, values: Array) -> Array:
+    def largest(self, values: Array) -> Array:
         """Return (N,) the largest value of each body, from values (M,) of the bars."""
         found = np.full(self.count, -np.inf)
         np.maximum.at(found, self.body, values)

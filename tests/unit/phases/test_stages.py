@@ -220,11 +220,10 @@ def test_a_wall_is_removed_at_once() -> None:
     assert engine.calls == [("remove_wall",)]
 
 
-@pytest.mark.parametrize(("thickness", "speed", "seed"), [(1.27e-3, 0.1, 1), (3e-3, 0.03, 2)])
-def test_a_lifted_wall_is_removed_when_it_is_clear_of_all_rows_of_links(
-    thickness: float, speed: float, seed: int
-) -> None:
-    lifted = {"type": "remove-container", "duration_s": 1.0, "speed_m_per_s": speed}
+@pytest.mark.parametrize(("thickness", "seed"), [(1.27e-3, 11), (3e-3, 2)])
+def test_a_lifted_wall_is_removed_when_it_is_clear_of_all_rows_of_links(thickness: float, seed: int) -> None:
+    speed = 0.01
+    lifted = {"type": "remove-container", "duration_s": 2.0, "speed_m_per_s": speed}
     scene, engine = begin(lifted, fidelity="reference", seed=seed, **{"smarticle.thickness_normal_m": thickness})
     top = engine.state().spheres(scene.body)[..., 2].max() + scene.body.radius
     stage, bottoms = scene.phases[1].begin(scene, 1), []
