@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from dem.arrays import Array, Numbers
-from dem.body.bars import Bars
+from dem.body.bars import JOINED, Bars
 from dem.body.filament import Filament
 from dem.body.linkage import Linkage
 from dem.body.particle import HINGE_CLEARANCE, Particle, smallest_effective_mass
@@ -53,8 +53,23 @@ class Body(Protocol):
         """(S, 3) centres of the spheres in the body's frame [m]."""
 
     @property
+    def outline(self) -> Array:
+        """(P, 3) centres of spheres, of that radius, that reach as far as the body: `centres`, and ends of strands [m].
+
+        Coordinates are in the body's frame.
+        """
+
+    @property
+    def outline_links(self) -> Numbers:
+        """(P,) number of the link, or bar, of each point of `outline`."""
+
+    @property
     def radius(self) -> float:
         """Radius of the spheres [m]."""
+
+    @property
+    def breadth(self) -> float:
+        """Extent of a bar across its axis, over all rows of its spheres, where it is largest [m]."""
 
     @property
     def reach(self) -> float:
@@ -141,13 +156,18 @@ class Kind:
         each = [np.repeat(self._stations(k) / lengths[k], self.rows) for k in range(len(lengths))]
         return np.concatenate(each)
 
+    @property
+    def offsets(self) -> Array:
+        """(rows,) offsets of the rows from a bar's axis, along its normal [m]; the outermost reach to its faces."""
+        reach = self.bars.thickness_normal / 2 - self.radius
+        return np.linspace(-reach, reach, self.rows) if self.rows > 1 else np.zeros(1)
+
     @cached_property
     def _layout(self) -> tuple[Array, Numbers]:
         bars, centres, links = self.bars, [], []
-        reach = bars.thickness_normal / 2 - self.radius if self.rows > 1 else 0.0
         for k, (ends, frame) in enumerate(zip(bars.ends, bars.frames, strict=True)):
             for station in self._stations(k):
-                for offset in np.linspace(-reach, reach, self.rows) if self.rows > 1 else (0.0,):
+                for offset in self.offsets:
                     centres.append(ends[0] + station * frame[:, 0] + offset * frame[:, 2])
                     links.append(k)
         return np.array(centres), np.array(links, dtype=np.int64)
@@ -160,6 +180,39 @@ class Kind:
     def links(self) -> Numbers:
         """(S,) number of the bar to which each sphere belongs."""
         return self._layout[1]
+
+    @property
+    def spread(self) -> float:
+        """Distance of the outermost rows from a bar's axis, along its normal [m]."""
+        return float(self.offsets[-1])
+
+    @property
+    def breadth(self) -> float:
+        return 2 * self.spread + self.diameter
+
+    @cached_property
+    def _uncovered(self) -> tuple[Array, Numbers]:
+        """Ends (n, 3) of strands at joints, where no sphere is [m], and the number (n,) of the bar of each.
+
+        These are strands of bars that are twisted against each other, and of bars too short for a sphere. Where
+        bodies change their shape, the spheres of `BarState.spheres` alone count.
+        """
+        if self.bends:
+            return np.zeros((0, 3)), np.zeros(0, np.int64)
+        normals = self.bars.frames[:, None, None, :, 2]
+        ends = self.bars.ends[:, :, None] + self.offsets[:, None] * normals  # (bars, 2, rows, 3)
+        bars, sides = np.nonzero(~self.bars.free)
+        points, bars = ends[bars, sides].reshape(-1, 3), np.repeat(bars, self.rows)
+        off = np.abs(points[:, None] - self.centres).max(axis=-1).min(axis=1, initial=np.inf) > JOINED * self.size
+        return points[off], bars[off]
+
+    @cached_property
+    def outline(self) -> Array:
+        return np.concatenate([self.centres, self._uncovered[0]])
+
+    @property
+    def outline_links(self) -> Numbers:
+        return np.concatenate([self.links, self._uncovered[1]])
 
     @property
     def reach(self) -> float:
@@ -279,6 +332,21 @@ class Mixture:
     def reach(self) -> float:
         """Largest distance of a point of any body from the centre of mass of this body [m]."""
         return max(kind.reach for kind in self.kinds)
+
+    @cached_property
+    def radii(self) -> Array:
+        """(K,) radii of the spheres, or strands, of each kind [m]."""
+        return np.array([kind.radius for kind in self.kinds])
+
+    @cached_property
+    def spreads(self) -> Array:
+        """(K,) distance of the outermost rows from the axis of a bar of each kind, along its normal [m]."""
+        return np.array([kind.spread for kind in self.kinds])
+
+    @cached_property
+    def outlines(self) -> Array:
+        """(K, P, 3) points `Kind.outline` of each kind in its frame [m]; shorter rows repeat the last point."""
+        return padded([kind.outline for kind in self.kinds])
 
     @cached_property
     def spheres(self) -> Array:

@@ -335,6 +335,14 @@ class Particle:
         return self._layout[0]
 
     @property
+    def outline(self) -> Array:
+        return self.centres
+
+    @property
+    def outline_links(self) -> Numbers:
+        return self.links
+
+    @property
     def links(self) -> Numbers:
         """(S,) int64: link of each sphere; 0 barb 1, 1 middle link, 2 barb 2."""
         return self._layout[1]
@@ -348,6 +356,15 @@ class Particle:
     @property
     def radius(self) -> float:
         return self.chain.diameter / 2
+
+    @property
+    def spread(self) -> float:
+        """Distance of the outermost rows of spheres from a link's axis, along the normal [m]."""
+        return float(self._rows[-1])
+
+    @property
+    def breadth(self) -> float:
+        return 2 * max(self.spread, self.boxes.bulge) + self.diameter
 
     @property
     def reach(self) -> float:

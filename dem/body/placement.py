@@ -91,7 +91,7 @@ def place_layer(
         for _ in range(ATTEMPTS):
             rotation = Rotation.random(random_state=rng)
             turn = rotation.as_matrix()
-            spheres = turned(turn, particle.centres)
+            spheres = turned(turn, particle.outline)
             distance, angle = radius * math.sqrt(rng.random()), 2 * math.pi * rng.random()
             lift = rng.random()
             lowest = spheres[:, 2].min() - particle.radius

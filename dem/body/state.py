@@ -140,13 +140,13 @@ class BarState:
 
     @cached_property
     def tops(self) -> Array:
-        return self._largest(self.segments[..., 2].max(axis=1))
+        return self.largest(self.segments[..., 2].max(axis=1))
 
     @cached_property
     def speeds(self) -> Array:
-        return self._largest(np.linalg.norm(self.bar_velocities, axis=1))
+        return self.largest(np.linalg.norm(self.bar_velocities, axis=1))
 
-    def _largest(self, values: Array) -> Array:
+    def largest(self, values: Array) -> Array:
         """Return (N,) the largest value of each body, from values (M,) of the bars."""
         found = np.full(self.count, -np.inf)
         np.maximum.at(found, self.body, values)
@@ -203,8 +203,11 @@ class RigidState(BarState):
         return self.spins[self.body]
 
     def spheres(self) -> Array:
-        local = self.mixture.spheres[self.kind]
-        return matrix_product(local, np.swapaxes(self.rotations, 1, 2)) + self.positions[:, None]
+        return self.placed(self.mixture.spheres)
+
+    def placed(self, points: Array) -> Array:
+        """Return (N, P, 3) places [m] of points (K, P, 3) in the frames of all kinds [m], those of each body's kind."""
+        return matrix_product(points[self.kind], np.swapaxes(self.rotations, 1, 2)) + self.positions[:, None]
 
     @cached_property
     def _own_spins(self) -> tuple[Array, Array]:

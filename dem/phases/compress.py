@@ -6,6 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
+from dem.body.outline import tops_of
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
@@ -96,7 +97,7 @@ class Compress(Part, Phase):
         if memory["start"] is None:
             engine.motors.weld()
             if boundaries.plate_height is None:
-                boundaries.place_plate(float(engine.state().tops.max()) + engine.particle.radius)
+                boundaries.place_plate(float(tops_of(engine.state(), stage.scene.model).max()))
             assert boundaries.plate_height is not None
             memory["start"] = boundaries.plate_height - boundaries.floor
             self._begin_leg(memory, engine)

@@ -10,8 +10,9 @@ from pydantic import Field
 
 from dem.arrays import Array, Flags
 from dem.body.loops import curves_of
+from dem.body.outline import outline_of, tops_of
 from dem.body.placement import place_layer
-from dem.body.state import PileState, spheres_of
+from dem.body.state import PileState
 from dem.engine.interface import Engine
 from dem.errors import RunError
 from dem.phases.phase import (
@@ -141,14 +142,14 @@ class Deposit(Part, Phase):
         rng = np.random.default_rng()
         rng.bit_generator.state = memory["random"]
         particle, mixture, state = scene.model, scene.mixture, engine.state()
-        tops = state.tops
         cylinder, slab = engine.cylinder, self.layer_height_w * particle.size
         if self.every_s is None:
-            bottom = tops.max(initial=engine.boundaries.floor) + particle.radius
+            # Rows of flat bars may reach higher; they are obstacles, and none of the layer begins in them.
+            bottom = state.tops.max(initial=engine.boundaries.floor) + particle.radius
         else:
             # Earlier layers may still fall: a fixed height keeps the distance between layers.
             bottom = cylinder.height - slab - 2 * particle.reach
-        near = tops > bottom - 3 * particle.radius
+        near = tops_of(state, particle) > bottom - 3 * particle.radius
         hooks = [cross.obstacles(2 * particle.radius) for cross in (scene.hooks.crosses if scene.hooks else ())]
         poured = scene.count - memory["left"]
         kinds = None if mixture is None else mixture.of[poured : poured + size]
@@ -158,7 +159,7 @@ class Deposit(Part, Phase):
             radius=float(cylinder.inner_radii(np.array([bottom]))[0]),
             bottom=bottom,
             height=slab,
-            obstacles=np.concatenate([spheres_of(state, particle)[near].reshape(-1, 3), *hooks]),
+            obstacles=np.concatenate([outline_of(state, particle)[near].reshape(-1, 3), *hooks]),
             rng=rng,
             narrower=cylinder.inner_radii if cylinder.upper else None,
             thickest=particle.radius,

@@ -15,10 +15,11 @@ from scipy.spatial.transform import Rotation
 from dem.arrays import Array, Numbers
 from dem.body.kinds import Kind, bodies_of
 from dem.body.loops import Curves, curves_of
+from dem.body.outline import outline_of
 from dem.body.particle import Particle
 from dem.body.placement import Poses
 from dem.body.posing import Pose, posed
-from dem.body.state import FilamentState, LinkageState, PileState, RigidState, State, spheres_of
+from dem.body.state import FilamentState, LinkageState, PileState, RigidState, State
 from dem.engine.interface import Engine
 from dem.errors import InputError
 from dem.phases.phase import Memory, Phase, SceneView, Stage
@@ -218,7 +219,7 @@ def _state(scene: SceneView, poses: Poses) -> PileState:
 
 @dataclass(frozen=True)
 class _Spheres:
-    """All S spheres of placed bodies, which stand for their bars."""
+    """All S spheres of the outlines of placed bodies, which stand for their bars."""
 
     places: Array  #: (S, 3) centres [m]
     radii: Array  #: (S,) [m]
@@ -265,15 +266,15 @@ class _Spheres:
 def _spheres(scene: SceneView, poses: Poses, names: list[str]) -> _Spheres:
     models = bodies_of(scene.model)
     kinds = np.zeros(len(names), np.int64) if poses.kinds is None else poses.kinds
-    sizes = np.array([len(model.centres) for model in models])[kinds]
+    sizes = np.array([len(model.outline) for model in models])[kinds]
     # Rows of bodies with fewer spheres repeat the last one.
-    rows = zip(spheres_of(_state(scene, poses), scene.model), sizes, strict=True)
+    rows = zip(outline_of(_state(scene, poses), scene.model), sizes, strict=True)
     body = np.repeat(np.arange(len(names)), sizes)
     return _Spheres(
         places=np.concatenate([row[:size] for row, size in rows]),
         radii=np.array([model.radius for model in models])[kinds][body],
         body=body,
-        bar=np.concatenate([models[kind].links for kind in kinds]),
+        bar=np.concatenate([models[kind].outline_links for kind in kinds]),
         apart=np.array([_apart(model) for model in models])[kinds][body],
         names=names,
     )

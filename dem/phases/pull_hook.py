@@ -81,12 +81,13 @@ class PullHook(Part, Phase):
     def _near_the_wall(self, scene: SceneView, hooks: Hooks) -> Sequence[str]:
         highest = np.array([hooks.upper_height_m + self.distance_m])
         gap = float(scene.cylinder.inner_radii(highest)[0]) - hooks.crosses[1].reach
-        if gap >= scene.sphere_diameter:
+        width = max(body.breadth for body in scene.bodies)
+        if gap >= width:
             return ()
         return (
             f"hooks.length_m: the bars of the upper hook end {gap:.3g} m before the wall, less than a link's width, "
-            f"{scene.sphere_diameter:.3g} m, so that links are wedged there and stop the run; use at most "
-            f"{0.995 * (hooks.length_m - 2 * (scene.sphere_diameter - gap)):.3g} m or a wider container",
+            f"{width:.3g} m, so that links are wedged there and stop the run; use at most "
+            f"{0.995 * (hooks.length_m - 2 * (width - gap)):.3g} m or a wider container",
         )
 
     def pushing_speed(self, gravity: float) -> float:

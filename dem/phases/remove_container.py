@@ -5,6 +5,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
+from dem.body.outline import tops_of
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.errors import RunError
@@ -57,8 +58,7 @@ class RemoveContainer(Part, Phase):
                 memory["lifting"] = True
         left = time_left(engine, memory["end"])
         if memory["lifting"]:
-            top = engine.state().tops.max() + engine.particle.radius
-            if engine.boundaries.wall_bottom > top:
+            if engine.boundaries.wall_bottom > tops_of(engine.state(), stage.scene.model).max():
                 engine.boundaries.remove_wall()
                 memory["lifting"] = False
             elif not left:

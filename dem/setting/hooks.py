@@ -107,7 +107,6 @@ class Cross:
         """Return (n, 3) points in the bars [m], which stand for the bars when bodies are placed.
 
         A sphere of this `diameter` [m] touches no bar if its centre is a diameter or more away from all points.
-                no bar.
         """
         # No point of a bar is farther than √3/2 of the spacing from the grid, less than the radius that is kept away.
         points: list[tuple[float, ...]] = []

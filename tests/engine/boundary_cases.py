@@ -82,6 +82,21 @@ def tap_and_sweep(data: dict[str, Any], *, index: int) -> dict[str, Any]:
     return {"heights": np.array(heights), "time_step": engine.time_step}
 
 
+def lift(data: dict[str, Any], places: list[list[float]]) -> dict[str, float]:
+    """Bodies at places, unturned, in a wall that is lifted until it is removed: its lower edge then, and their top."""
+    scene = scene_of(data)
+    engine = cases.build(scene, cylinder=scene.cylinder)
+    for place in places:
+        add(engine, place, Rotation.identity())
+    stage, bottom, top = scene.phases[1].begin(scene, 1), 0.0, 0.0
+    while (wait := stage.proceed(engine)) and engine.boundaries.walled:
+        engine.advance(round(wait / engine.time_step))
+        bottom = engine.boundaries.wall_bottom
+        spheres = [body for body in engine._omega.bodies if type(body.shape).__name__ == "Sphere"]
+        top = max(body.state.pos[2] + body.shape.radius for body in spheres)
+    return {"bottom": bottom, "top": top, "walled": engine.boundaries.walled}
+
+
 def remove(data: dict[str, Any], *, count: int, settle: float, watch: float) -> dict[str, Any]:
     """A pile at rest whose wall goes away at once: contacts and energies before, right after, and while it spreads."""
     scene = scene_of(data)

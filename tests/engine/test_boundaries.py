@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from processes import series
 
+from dem.phases.phase import CHECK_INTERVAL
+
 Simulate = Callable[..., dict[str, Any]]
 SceneData = Callable[..., dict[str, Any]]
 
@@ -87,6 +89,17 @@ def test_removing_the_wall_leaves_no_contact_and_adds_no_energy(simulate: Simula
     assert totals[-1] < 0.95 * totals[0]
     assert gone["outside"] > 1.2 * 0.0135
     assert gone["lowest"] > 0
+
+
+def test_a_wall_is_lifted_over_bars_that_stand_on_their_edge(simulate: Simulate, scene_data: SceneData) -> None:
+    data = scene_data({"fidelity": "reference", "count": 1, "smarticle.thickness_normal_m": 3e-3})
+    lifted = {"type": "remove-container", "duration_s": 0.6, "speed_m_per_s": 0.01}
+    data |= {"phases": [{"type": "deposit"}, lifted], "container": {"radius_m": 0.012}}
+    gone = simulate(boundary_cases.lift, data, [[0.0, 0.0, 1.5e-3]])
+    assert not gone["walled"]
+    assert gone["top"] == pytest.approx(3e-3, rel=1e-3)
+    # Within the way between two checks; at the axis and a radius, 1.75 mm, links would still lean on the wall.
+    assert gone["top"] < gone["bottom"] < gone["top"] + 0.01 * CHECK_INTERVAL * 1.01
 
 
 def test_the_energy_ledger_closes_while_a_mould_is_lifted(

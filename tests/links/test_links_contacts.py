@@ -146,6 +146,12 @@ def test_a_smarticle_that_bridges_both_grips_is_two_springs_in_a_row(count: int)
     # of raising is 0.25 % of it.
     assert mean[1, 2] == pytest.approx(-500.0 * (raised - gap) / 2, rel=3e-3)
     assert mean[0, 2] == pytest.approx(-mean[1, 2], rel=1e-6)
+    # The hooks hold it once they are more than a tenth of a diameter apart from where they began.
+    assert made.overlaps(1e-6).deep.all()
+    assert made.overlaps(1e-6).held == ()
+    made.boundaries.raise_upper(0.01)
+    made.advance(100)
+    assert [one.between for one in made.overlaps(1e-6).held] == [("the lower hook", "the upper hook")]
 
 
 def test_a_ceiling_between_tiers_stops_what_rises() -> None:

@@ -191,6 +191,7 @@ class LinksBoundaries:
         """
         if self._world.hooks is None:
             return {}
-        place = self._ground.place - self._starts - (self.floor - self._starts[FLOOR])
-        found = {"the lower hook": (LOWER, 0.0), "the upper hook": (UPPER, float(place[UPPER]))}
-        return found | ({"the wall": (WALL, float(place[WALL]))} if self._ground.flags[0] else {})
+        moved = self._ground.place[: UPPER + 1] - self._starts[: UPPER + 1]  # not the plate's, which may be at inf
+        rise = moved - moved[FLOOR]
+        found = {"the lower hook": (LOWER, 0.0), "the upper hook": (UPPER, float(rise[UPPER]))}
+        return found | ({"the wall": (WALL, float(rise[WALL]))} if self._ground.flags[0] else {})

@@ -1,5 +1,6 @@
 """Scenes with hooks, a wall that is removed, or a mould of tiers: their defaults."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -53,3 +54,19 @@ def test_a_hook_that_leaves_a_gap_as_wide_as_a_link_at_the_wall_wedges_none() ->
     assert warning.startswith("hooks.length_m: the bars of the upper hook end 0.0006")
     advised = float(warning.partition("use at most ")[2].partition(" m")[0])
     assert warnings_of(small(changes | {"hooks": {"length_m": advised}})) == ()
+
+
+@pytest.mark.parametrize(("fidelity", "width"), [("draft", 2 * (1.27e-3 + T2) / math.pi), ("standard", 1.27e-3)])
+def test_the_gap_between_a_hook_and_the_wall_is_compared_with_the_wide_side_of_links(
+    fidelity: str, width: float
+) -> None:
+    changes = {"engine": "links", "fidelity": fidelity, "hooks": {}, "count": 400, "phases": [DEPOSIT, PULL]}
+    inner = small(changes).cylinder.inner_radius
+
+    def warned(gap: float) -> bool:
+        # The bars' corners are the outermost points.
+        length = 2 * math.sqrt((inner - gap) ** 2 - (T2 / 2) ** 2)
+        return any("wedged" in warning for warning in warnings_of(small(changes | {"hooks": {"length_m": length}})))
+
+    assert warned(width - 2e-5)
+    assert not warned(width + 2e-5)

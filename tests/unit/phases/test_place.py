@@ -65,6 +65,24 @@ def test_bodies_that_barely_overlap_are_accepted(tmp_path: Path) -> None:
         assert scene(tmp_path).phases[0].kind == "place"
 
 
+def test_strands_of_twisted_bars_count_where_they_meet(tmp_path: Path) -> None:
+    # At its joints with the crown a leg has two strands, 1.25 mm to both sides of its axis, where only the crown has
+    # spheres. The legs lean by 50°, so that one of these strands is the lowest point.
+    staple = {"shape": "staple", "crown_m": 0.012, "leg_m": 0.006, "twist_deg": 90}
+    flat = staple | {"thickness_normal_m": 3e-3, "thickness_in_plane_m": 0.5e-3}
+    lean = np.radians(50)
+    below = 1.25 * np.sin(lean) + 0.25
+    for depth in (-0.01, 0.1):
+        leg, height = 6 * np.array([0, -np.sin(lean), np.cos(lean)]), below - depth
+        joints = np.array([[-6, 0, height], [6, 0, height]])
+        write(tmp_path, [[joints[0] + leg, *joints, joints[1] + leg]])
+        changes = {"particle": flat, "count": 1, "fidelity": "standard"}
+        if depth < 0:
+            assert scene(tmp_path, **changes).count == 1
+        else:
+            assert "reaches 0.1 mm below the floor" in refused(tmp_path, **changes)
+
+
 @pytest.mark.parametrize(
     ("bodies", "changes", "message"),
     [
