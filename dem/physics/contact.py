@@ -1,7 +1,9 @@
 """Laws of contacts and strings, and the damping that gives a coefficient of restitution."""
 
+from __future__ import annotations
+
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -21,6 +23,11 @@ class ContactLaw:
     tangential_damping: float  #: Tangential over normal damping, cs/cn [1]
     friction: float  #: Coulomb coefficient between bodies [1]
     wall_friction: float  #: Coulomb coefficient at boundaries [1]
+
+    def of_mass(self, ratio: float) -> ContactLaw:
+        """Return the law of bodies whose typical effective mass is `ratio` times as large [1]."""
+        root = math.sqrt(ratio)
+        return replace(self, normal_damping=self.normal_damping * root, wall_damping=self.wall_damping * root)
 
 
 def typical_effective_mass(body: Body) -> float:
