@@ -24,10 +24,15 @@ class ContactLaw:
     friction: float  #: Coulomb coefficient between bodies [1]
     wall_friction: float  #: Coulomb coefficient at boundaries [1]
 
-    def of_mass(self, ratio: float) -> ContactLaw:
-        """Return the law of bodies whose typical effective mass is `ratio` times as large [1]."""
-        root = math.sqrt(ratio)
-        return replace(self, normal_damping=self.normal_damping * root, wall_damping=self.wall_damping * root)
+    def scaled(self, *, springs: float = 1.0, dashpots: float = 1.0) -> ContactLaw:
+        """Return the law with all springs and all dashpots multiplied by factors [1]."""
+        return replace(
+            self,
+            normal_stiffness=springs * self.normal_stiffness,
+            tangential_stiffness=springs * self.tangential_stiffness,
+            normal_damping=dashpots * self.normal_damping,
+            wall_damping=dashpots * self.wall_damping,
+        )
 
 
 def typical_effective_mass(body: Body) -> float:

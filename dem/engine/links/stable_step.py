@@ -78,12 +78,8 @@ def mixture_stable_time_step(mixture: Mixture, law: ContactLaw) -> float:
     shapes = [kind_shape(kind) for kind in mixture.kinds]
     masses, steps = [shape.effective_mass for shape in shapes], []
     for kind, shape, mass in zip(mixture.kinds, shapes, masses, strict=True):
-        own, stiffer = law.of_mass(mass / masses[0]), (1 + math.sqrt(mass / min(masses))) / 2
-        bound = replace(
-            own,
-            normal_stiffness=stiffer * law.normal_stiffness,
-            tangential_stiffness=stiffer * law.tangential_stiffness,
-        )
+        own = law.scaled(dashpots=math.sqrt(mass / masses[0]))
+        bound = own.scaled(springs=(1 + math.sqrt(mass / min(masses))) / 2)
         if kind.linkage is not None:
             steps.append(linkage_stable_time_step(kind.linkage, link_shapes(kind), bound, own))
         elif kind.filament is not None:
