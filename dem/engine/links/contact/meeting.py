@@ -49,7 +49,8 @@ from dem.engine.links.vectors import (
     vector,
 )  # fmt: skip
 
-# Rows that `meet` writes: three points of contact, then bare forces: forces without friction and dashpot.
+# Rows that `meet` writes: three points of contact, half way between the axes, then bare forces: forces without friction
+# and dashpot.
 POINTS, BARE = 3, 10
 ENERGY = POINTS + BARE  # row whose first number is E
 ROWS = ENERGY + 1
