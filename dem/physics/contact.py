@@ -1,7 +1,9 @@
 """Laws of contacts and strings, and the damping that gives a coefficient of restitution."""
 
+from __future__ import annotations
+
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -21,6 +23,16 @@ class ContactLaw:
     tangential_damping: float  #: Tangential over normal damping, cs/cn [1]
     friction: float  #: Coulomb coefficient between bodies [1]
     wall_friction: float  #: Coulomb coefficient at boundaries [1]
+
+    def scaled(self, *, springs: float = 1.0, dashpots: float = 1.0) -> ContactLaw:
+        """Return the law with all springs and all dashpots multiplied by factors [1]."""
+        return replace(
+            self,
+            normal_stiffness=springs * self.normal_stiffness,
+            tangential_stiffness=springs * self.tangential_stiffness,
+            normal_damping=dashpots * self.normal_damping,
+            wall_damping=dashpots * self.wall_damping,
+        )
 
 
 def typical_effective_mass(body: Body) -> float:

@@ -195,3 +195,28 @@ def test_a_staple_of_right_angles_falls_and_collides_as_a_smarticle(tmp_path: Pa
     moved = together[-1][0].segments - together[0][0].segments
     assert np.abs(moved).max() > 1e-3
     assert max(there.contacts.sum() for there, _ in together) > 0
+
+
+@pytest.mark.parametrize("turn_deg", [90.0, 0.0], ids=["crossed", "along"])  # one point of contact, and two
+@pytest.mark.parametrize("radii", [(0.3e-3, 1.5e-3), (1.5e-3, 0.3e-3)], ids=["thin on thick", "thick on thin"])
+def test_friction_acts_on_the_surfaces_of_bars_of_unequal_thickness(
+    radii: tuple[float, float], turn_deg: float
+) -> None:
+    particle = [{"shape": "rod", "length_m": 0.02, "diameter_m": 2 * radius, "share": 1} for radius in radii]
+    scene = small({"engine": "links", "count": 2, "particle": particle, "container.radius_m": 0.2})
+    engine, depth = build_engine(scene, 1e-7), 0.02 * min(radii)
+    assert isinstance(engine, LinksEngine)
+    positions = np.array([[0.0, 0.0, 0.1 + sum(radii) - depth], [0.0, 0.0, 0.1]])
+    turns = Rotation.identity(), Rotation.from_euler("z", turn_deg, degrees=True)
+    engine.add(Poses(positions, turns, np.array([0, 1])))
+    bodies = engine._world.bodies
+    bodies.momentum[0, 0] = 200.0 * scene.bodies[0].inertia.min()  # it spins about its own axis, along x
+    before = bodies.momentum[:, 0].copy()
+    engine.advance(40)
+    # A force F along y at the surface has the torque F r about x. Half way between the axes both arms would be equal.
+    turned, pushed = bodies.momentum[:, 0] - before, bodies.velocity[:, 1] * [body.mass for body in scene.bodies]
+    assert pushed[0] < 0 < pushed[1]
+    arms = np.array([1, -1]) * (np.array(radii) - depth / 2)
+    np.testing.assert_allclose(turned / pushed, arms, rtol=5e-3)  # the depth changes by less
+    heights = engine.contact_forces().points[:, 2] - engine.state().positions[1, 2]
+    np.testing.assert_allclose(heights, radii[1] - depth / 2, rtol=1e-3)

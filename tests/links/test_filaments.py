@@ -406,12 +406,18 @@ def soft(stiffness: float = 10.0) -> ContactLaw:
     )  # fmt: skip
 
 
+def stable_step_in(made: World, filament: Filament, law: ContactLaw) -> float:
+    """The stable step, where the dashpots of `law` are those of the first kind of a world."""
+    share = filament.effective_mass / made.kinds[0].effective_mass
+    return filament_stable_time_step(filament, law.scaled(dashpots=math.sqrt(share)))
+
+
 def pile(count: int, *, seed: int = 1, **more: object) -> World:
     """Return filaments above each other, each in an arc, which fall into a dish."""
     filament, rng = replace(ACTIVE, **more), np.random.default_rng(seed)  # type: ignore[arg-type]
     law = soft()
     made = world(filament, gravity=9.81, law=law, radius=12e-3)
-    made.set_time_step(0.9 * filament_stable_time_step(filament, law, made.kinds[0].effective_mass))
+    made.set_time_step(0.9 * stable_step_in(made, filament, law))
     bow, points = 7.5e-3, np.zeros((count, filament.nodes, 3))
     for k in range(count):
         angle = np.linspace(-2, 2, filament.nodes) + rng.uniform(0, 6)
@@ -424,7 +430,7 @@ def pile(count: int, *, seed: int = 1, **more: object) -> World:
 def test_the_ledger_of_a_filament_that_bends_by_itself_does_not_grow_with_its_work(liquid: Liquid | None) -> None:
     filament = replace(ACTIVE, liquid=liquid)
     made = world(filament)
-    made.set_time_step(0.9 * filament_stable_time_step(filament, soft(), made.kinds[0].effective_mass))
+    made.set_time_step(0.9 * stable_step_in(made, filament, soft()))
     made.add_filaments(1, straight(filament, 0.05), seed=1)
     held = LinksFilaments(made)
     start, found = held.energies.residual, []
@@ -575,7 +581,7 @@ def test_no_roll_drag_adds_energy_or_needs_shorter_steps(drag: float) -> None:
         filament = replace(ACTIVE, liquid=None, curvature=None, roll_drag=own)
         made = world(filament)
         law = soft()
-        made.set_time_step(0.9 * filament_stable_time_step(filament, law, made.kinds[0].effective_mass))
+        made.set_time_step(0.9 * stable_step_in(made, filament, law))
         made.add_filaments(1, zigzag(filament, math.radians(30)))
         held = LinksFilaments(made)
         assert made.filaments is not None

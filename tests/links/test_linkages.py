@@ -17,6 +17,8 @@ from dem.engine.links.arrays import Bodies, Linkages
 from dem.engine.links.engine import LinksEngine
 from dem.engine.links.joints import pins_of
 from dem.engine.links.linkages import LinksLinkages
+from dem.engine.links.motion.joining import PIN, PIN_DAMPING
+from dem.physics.contact import damping_ratio, typical_effective_mass
 from dem.plan.steps import stable_step
 from dem.run.build import build_engine
 from dem.scene.scene import Scene
@@ -235,6 +237,22 @@ def test_a_hinge_bends_off_its_axis_by_no_more_than_its_pin_gives_way() -> None:
     assert math.asin(np.linalg.norm(np.cross(*axes))) == pytest.approx(mass * G * L / 2 / off, rel=0.02)
     assert state(engine).gaps.max() == pytest.approx(mass * G / pin, rel=0.02)
     assert off == pytest.approx(pin * D**2 / 2, rel=1e-9)  # two pins at half the width
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_pins_of_each_kind_have_the_damping_ratio_of_contacts(order: int) -> None:
+    particle = [
+        {"shape": "chain", "links": 2, "link_m": L, "diameter_m": d, "joints": {"law": "free"}, "count": 1}
+        for d in (D, D / 4)
+    ]
+    scene = chains(None, particle=particle[::order], count=2, contact={"restitution": 0.5})
+    engine, ratios = build_engine(scene, 1e-6), []
+    assert isinstance(engine, LinksEngine)
+    engine.add(Poses(np.array([[0, 0, 0.1], [0, 0, 0.2]]), [Rotation.identity()] * 2, kinds=np.array([0, 1])))
+    for kind, row in zip(scene.bodies, arrays(engine).row[::2], strict=True):  # each with one joint
+        # Of two equal bodies, the law of contacts has c = 2 ζ √(k m/2) with the typical effective mass m.
+        ratios.append(row[PIN_DAMPING] / math.sqrt(2 * row[PIN] * typical_effective_mass(kind)))
+    assert ratios == pytest.approx([damping_ratio(0.5)] * 2, rel=1e-9)
 
 
 @pytest.mark.parametrize(("axes", "driven"), [(1, 0), (2, 0), (2, 1), (3, 0), (3, 2)])

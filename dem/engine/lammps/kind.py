@@ -46,8 +46,19 @@ class LammpsKind:
     threads = staticmethod(ranks)
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
-        # Spheres, law and scheme of integration are YADE's.
-        return min(stable_time_step(body, contact_law_of(scene)) for body in scene.bodies)
+        """Return the largest stable time step [s]; spheres, springs and scheme of integration are those of YADE.
+
+        The dashpots of bodies of the masses m and m' are c ∝ m m'/(m + m'). As in
+        `dem.engine.links.stable_step.mixture_stable_time_step`, but with θ = m/m', a body among others is bounded by
+        one among its equals with the dashpots of its own kind, and springs (1 + θ)/2 times as stiff.
+        """
+        law, masses = contact_law_of(scene), [body.mass for body in scene.bodies]
+        return min(
+            stable_time_step(
+                body, law.scaled(springs=(1 + body.mass / min(masses)) / 2, dashpots=body.mass / masses[0])
+            )
+            for body in scene.bodies
+        )
 
     def seconds_per_second(self, scene: Demand, time_step: float, activity: Activity) -> float:
         spheres, per_sphere = mean_spheres(scene) * scene.count, STEP.get(activity, STEP[Activity.SHAKE])

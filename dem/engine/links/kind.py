@@ -10,12 +10,9 @@ from dem.engine.links.adds import ADDS, ORDER
 from dem.engine.links.cache import announce, is_kept, stamp
 from dem.engine.links.cost import COMPILE_FIRST, COMPILE_MORE, seconds_per_second
 from dem.engine.links.engine import LinksEngine
-from dem.engine.links.shapes import kind_shape, link_shapes
 from dem.engine.links.stable_step import (
-    filament_stable_time_step,
-    linkage_stable_time_step,
     links_stable_time_step,
-    rigid_stable_time_step,
+    mixture_stable_time_step,
 )
 
 # Groups of arrays without which `advance` is compiled where a scene has none of them.
@@ -45,14 +42,7 @@ class LinksKind:
 
     def stable_step(self, scene: Demand, *, articulated: bool) -> float:
         if scene.mixture is not None:
-            shapes, law = [kind_shape(kind) for kind in scene.mixture.kinds], contact_law_of(scene)
-            rods = [shape.filament for shape in shapes if shape.filament is not None]
-            if scene.mixture.jointed:
-                pairs = [(kind.linkage, link_shapes(kind)) for kind in scene.mixture.kinds]
-                return min(linkage_stable_time_step(one, links, law) for one, links in pairs if one is not None)
-            if rods:
-                return min(filament_stable_time_step(rod, law, shapes[0].effective_mass) for rod in rods)
-            return rigid_stable_time_step(shapes, law)
+            return mixture_stable_time_step(scene.mixture, contact_law_of(scene))
         return links_stable_time_step(
             scene.body,
             contact_law_of(scene),

@@ -2,6 +2,10 @@
 
 Leapfrog takes the velocities of dashpots half a step late. With the matrices M of mass, K of stiffness and C of damping
 of a body in a mode, a step dt is stable while K dt² + 2 C dt - 4 M has no positive eigenvalue.
+
+A mode of several bodies is never stiffer than modes of each body alone, whose contacts are stiffer: for any θ > 0,
+|a - b|² ≤ (1 + θ) |a|² + (1 + 1/θ) |b|² for the motions a and b of two bodies at their contact. Between equal bodies
+θ = 1: neighbours that move against each other double the stiffness.
 """
 
 import math
@@ -12,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dem.body.filament import Filament
+from dem.body.kinds import Mixture
 from dem.body.linear import matrix_product, positive_definite
 from dem.body.linkage import Linkage
 from dem.body.particle import Particle
@@ -19,7 +24,7 @@ from dem.engine.links.arrays import PLANE
 from dem.engine.links.joints import pins_of
 from dem.engine.links.motion.bending import RESOLVED
 from dem.engine.links.motion.planar import lay_out
-from dem.engine.links.shapes import AT_END, AT_START, RADIUS, Shape, filament_shape, smarticle_shape
+from dem.engine.links.shapes import AT_END, AT_START, RADIUS, Shape, kind_shape, link_shapes, smarticle_shape
 from dem.physics.contact import ContactLaw
 
 Array = NDArray[np.float64]
@@ -62,17 +67,38 @@ def links_stable_time_step(
     return min(_step_of(shape, each, law, articulated, strings) for shape, each in zip(shapes, angles, strict=True))
 
 
-def filament_stable_time_step(filament: Filament, law: ContactLaw, effective_mass: float) -> float:
+def mixture_stable_time_step(mixture: Mixture, law: ContactLaw) -> float:
+    """Return the largest stable time step [s] over the modes of all kinds of a mixture.
+
+    The pair of kinds i and j with the typical effective masses m and m' has the stiffness k and a dashpot
+    c ∝ √(m m'/(m + m')). With θ = √(m/m') the body i by itself has the stiffness (1 + θ) k, which is largest beside the
+    lightest kind, and the damping (1 + θ) c, which is largest beside its own kind. So the modes of each kind are taken
+    among its equals, with its own dashpots and (1 + θ)/2 times the stiffness.
+    """
+    shapes = [kind_shape(kind) for kind in mixture.kinds]
+    masses, steps = [shape.effective_mass for shape in shapes], []
+    for kind, shape, mass in zip(mixture.kinds, shapes, masses, strict=True):
+        own = law.scaled(dashpots=math.sqrt(mass / masses[0]))
+        bound = own.scaled(springs=(1 + math.sqrt(mass / min(masses))) / 2)
+        if kind.linkage is not None:
+            steps.append(linkage_stable_time_step(kind.linkage, link_shapes(kind), bound, own))
+        elif kind.filament is not None:
+            steps.append(filament_stable_time_step(kind.filament, bound))
+        else:
+            steps.append(rigid_stable_time_step(shape, bound))
+    return min(steps)
+
+
+def filament_stable_time_step(filament: Filament, law: ContactLaw) -> float:
     """Return the largest stable time step [s] over the stiffest modes of a filament among filaments.
 
     In these modes neighbouring nodes move in opposite directions: along the filament, across it, or about its axis. The
     stiffness is that of stretching, bending or twisting plus that of contacts. Two cases of contacts are considered:
     contacts at a tip, and contacts along both sides of the filament, one per diameter. The bodies that touch a node are
-    assumed to move opposite to it. The damping in `law` was computed for the `effective_mass` of a body [kg].
+    assumed to move opposite to it.
     """
     length, mass = filament.segment_length, filament.mass / (filament.nodes - 1)
-    share = math.sqrt(filament_shape(filament).effective_mass / effective_mass)
-    cn = max(2 * law.normal_damping, law.wall_damping) * share / mass
+    cn = max(2 * law.normal_damping, law.wall_damping) / mass
     kn, ks, cs = 2 * law.normal_stiffness / mass, 2 * law.tangential_stiffness / mass, cn * law.tangential_damping
     # A tip has half the mass of a node; contacts a diameter apart share their push between neighbouring nodes.
     tip, side = 2 * CONTACTS_AT_A_TIP, max(CONTACTS_AT_A_TIP, length / filament.diameter)
@@ -112,28 +138,19 @@ def _step_of(
     return _step_of_modes(mass, modes)
 
 
-def rigid_stable_time_step(shapes: Sequence[Shape], law: ContactLaw) -> float:
-    """Return the largest stable time step [s] over the stiffest modes of rigid bodies of several shapes.
-
-    The modes are: an end of a bar, with all its strands (segments side by side), against another such end or against a
-    boundary; and a pile of bodies that lie on their broad side, with a contact at every end, in which neighbours above
-    and below move in opposite directions, across or along the broad side.
-    """
-    return min(_rigid_step(shape, law) for shape in shapes)
-
-
-def linkage_stable_time_step(linkage: Linkage, links: Sequence[Shape], law: ContactLaw) -> float:
+def linkage_stable_time_step(linkage: Linkage, links: Sequence[Shape], law: ContactLaw, pins: ContactLaw) -> float:
     """Return the largest stable time step [s] over the stiffest modes of a linkage's links in a pile.
 
     They are those of rigid bodies, with the joints at both ends of a link, which the neighbours move against it: since
-    |a + b|² ≤ 2 (|a|² + |b|²), a joint of stiffness k is never stiffer than 2 k on each of its links by itself.
+    |a + b|² ≤ 2 (|a|² + |b|²), a joint of stiffness k is never stiffer than 2 k on each of its links by itself. The
+    springs of joints follow from the law `pins` of the linkage's own contacts.
     """
     known: dict[bytes, float] = {}
     for number, shape in enumerate(links):
-        joints = _joints_of(linkage, number, law)
+        joints = _joints_of(linkage, number, pins)
         key = shape.lines.tobytes() + joints[0].tobytes() + joints[1].tobytes()
         if key not in known:  # most links are alike
-            known[key] = _rigid_step(shape, law, joints)
+            known[key] = rigid_stable_time_step(shape, law, joints)
     return min(known.values())
 
 
@@ -159,8 +176,15 @@ def _joints_of(linkage: Linkage, number: int, law: ContactLaw) -> Mode:
     return stiffness, resisting
 
 
-def _rigid_step(shape: Shape, law: ContactLaw, joints: Mode | None = None) -> float:
-    """Return the stable step of a body, or of a link with the stiffness and damping of its joints."""
+def rigid_stable_time_step(shape: Shape, law: ContactLaw, joints: Mode | None = None) -> float:
+    """Return the largest stable time step [s] over the stiffest modes of a rigid body among bodies.
+
+    The modes are: an end of a bar, with all its strands (segments side by side), against another such end or against a
+    boundary; and a pile of bodies that lie on their broad side, with a contact at every end, in which neighbours above
+    and below move in opposite directions, across or along the broad side.
+
+    The stiffness and damping `joints` (6, 6) of a link's joints are added to each mode.
+    """
     mass = np.diag([*[shape.mass] * 3, *shape.inertia[:3]])
     places: dict[tuple[int, int], list[Array]] = {}  # strands at each end of each bar
     for line, link, shared in zip(shape.lines, shape.link, shape.shared, strict=True):

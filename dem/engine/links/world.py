@@ -303,7 +303,8 @@ class World:
             links.velocity[:, 2] = -speed
             links.shape[:] = begins[k] + np.arange(len(links.shape))
             self.linkages = linkages_at(
-                self.linkages, kind.linkage, body, links, self.contact,
+                self.linkages, kind.linkage, body, links,
+                self.contact.scaled(dashpots=math.sqrt(self.kinds[k].effective_mass / self.kinds[0].effective_mass)),
                 start=float(rng.uniform(0, 2 * math.pi)), seed=self.wave_seed,
                 angles=None if bent is None else bent.angles,
             )  # fmt: skip

@@ -18,6 +18,7 @@ from dem.engine.lammps.contacts import Contacts
 from dem.engine.lammps.text import contact_terms
 from dem.errors import InputError, RunError
 from dem.physics.contact import contact_law
+from dem.plan.steps import stable_step
 from dem.run.run import run_scene
 from dem.scene.reading import parse_scene
 from dem.setting.container import Cylinder
@@ -72,6 +73,24 @@ def test_damping_is_given_by_mass_as_lammps_multiplies_it() -> None:
     assert wall[2] * mass == pytest.approx(law.wall_damping, rel=1e-8)
     assert between[3] / between[2] == pytest.approx(law.tangential_damping, rel=1e-8)
     assert between[4:] == [law.friction, 1]
+
+
+def test_the_step_of_a_mixture_knows_that_dashpots_go_with_mass() -> None:
+    def step(*densities: float, **contact: float) -> float:
+        particle = [
+            {"shape": "rod", "length_m": 0.015, "diameter_m": 1e-3, "density_kg_per_m3": density, "count": 5}
+            for density in densities
+        ]
+        fidelity = {"base": "draft", "stiffness_N_per_m": 250.0}
+        count = 5 * len(densities)
+        return stable_step(
+            small({"engine": "lammps", "count": count, "particle": particle, "fidelity": fidelity, "contact": contact})
+        )
+
+    light, heavy = 1000.0, 9000.0
+    assert step(light, heavy) == pytest.approx(step(light), rel=1e-12)
+    # Dashpots of the heavy kind have a third of the rate of the light kind, which they then have for the light one too.
+    assert step(light) < step(heavy, light) < step(light, restitution=1.0)
 
 
 @pytest.fixture

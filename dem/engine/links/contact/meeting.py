@@ -49,7 +49,8 @@ from dem.engine.links.vectors import (
     vector,
 )  # fmt: skip
 
-# Rows that `meet` writes: three points of contact, then bare forces: forces without friction and dashpot.
+# Rows that `meet` writes: three points of contact, half way between the axes, then bare forces: forces without friction
+# and dashpot.
 POINTS, BARE = 3, 10
 ENERGY = POINTS + BARE  # row whose first number is E
 ROWS = ENERGY + 1
@@ -168,6 +169,18 @@ def meets_elsewhere(both: Lines, reach: float, shared_p: int, shared_q: int) -> 
 def _halfway(both: Lines, s: float, t: float) -> Vector:
     """Return the point half way between the point s of the first and the point t of the second axis [m]."""
     return scale(0.5, along(add(along(both.p, s, both.u), both.q), t, both.v))
+
+
+@inlined
+def in_overlap(halfway: Vector, normal: Vector, radii: tuple[float, float]) -> Vector:
+    """Return the middle of the overlap of two segments [m], where friction acts.
+
+    Args:
+        halfway: point half way between the axes [m], which is the middle of the overlap if the radii are equal.
+        normal: unit vector from the second segment to the first [1].
+        radii: radii of the first and the second segment [m].
+    """
+    return along(halfway, 0.5 * (radii[1] - radii[0]), normal)
 
 
 @inlined
