@@ -9,7 +9,6 @@ from dem.errors import InputError
 from dem.plan.ends import check_ends
 from dem.scene.scene import Scene
 from dem.scene.stiffness import too_soft
-from dem.setting.fidelity import MOST_ROWS
 from dem.strict import unit_of
 
 # Largest distance, in sphere diameters, by which boundaries may move in a step. Measured with a hook
@@ -68,10 +67,11 @@ def time_steps(scene: Scene) -> tuple[float, ...]:
     step of a scene without motors, since their smarticles are still rigid in the initial shape. Their results are
     bitwise equal to those of that scene. Smarticles that are welded later keep the barb angles that their motors
     reached, for which the longer step is not known to be stable. In a plane, or if `fidelity.time_step_s` is given,
-    there is no exception. InputError as in `time_step`, or if a wall, hook, string or shaking moves too fast for the
-    step of its phase, or the scene cannot end, see `dem.plan.ends`.
+    there is no exception. InputError as in `time_step`, or if bars have holes, or if a wall, hook, string or shaking
+    moves too fast for the step of its phase, or the scene cannot end, see `dem.plan.ends`.
     """
-    _check_rows(scene)
+    if holes := scene.sections.holes(scene.fidelity.rows, scene.least_rows):
+        raise InputError(holes)
     count, shortest = len(scene.phases), time_step(scene)
     first = next((k for k, phase in enumerate(scene.phases) if phase.actuates), count)
     steps = (shortest,) * count
@@ -83,17 +83,6 @@ def time_steps(scene: Scene) -> tuple[float, ...]:
     _check_speeds(scene, steps)
     check_ends(scene)
     return steps
-
-
-def _check_rows(scene: Scene) -> None:
-    """Raise InputError if strands, or rows of spheres, leave holes in flat bars that bodies of the scene pass."""
-    rows, least = scene.fidelity.rows, scene.least_rows
-    if 1 < rows < least:
-        several = f"use at least {least}, or " if least <= MOST_ROWS else f"no number up to {MOST_ROWS} is enough; use "
-        raise InputError(
-            f"fidelity.rows: {rows} strands side by side leave holes in flat bars, which the thinnest bars of the scene "
-            f"pass; {several}1, one round strand of the section's mean width"
-        )
 
 
 def _fraction(scene: Scene) -> float:

@@ -61,13 +61,18 @@ class Sections:
         """Return the diameter of the strands of a section, of several `rows` or one."""
         return self.diameter or (section.in_plane if rows and section.is_wide(None) else section.width)
 
-    def rows(self, *, smooth: bool, pitch: float) -> int:
-        """Return the least number of strands, or rows of spheres, of the flat bars; 1 without any, `MOST_ROWS` + 1 if it is above `MOST_ROWS`.
+    @property
+    def thinnest(self) -> float:
+        """Thickness of the thinnest bars [m]: of the hooks, or the diameter of strands side by side or of one."""
+        return min(self.hook, *(self._diameter(section, rows=True) for section in self.sections))
 
-        `pitch` is the distance of neighbouring spheres along a bar over their diameter [1]; strands of `smooth` links
+    def rows(self, *, smooth: bool, pitch: float) -> int:
+        """Return the least number of strands, or rows of spheres, of the flat bars; 1 without any.
+
+        It is `MOST_ROWS` + 1 for all numbers above `MOST_ROWS`. `pitch` is the distance of neighbouring spheres along a bar over their diameter [1]; strands of `smooth` links
         have none.
         """
-        thinnest = min(self.hook, *(self._diameter(section, rows=True) for section in self.sections))
+        thinnest = self.thinnest
         impact = WANTED["standard"] * min(mean_width(section.normal, section.in_plane) for section in self.sections)
         most = 1
         for section in self.sections:
@@ -82,6 +87,17 @@ class Sections:
                     break
             most = max(most, rows)
         return most
+
+    def holes(self, rows: int, least: int) -> str | None:
+        """Return a message if `rows` strands side by side are less than `least`, those of `rows`; None otherwise."""
+        if not 1 < rows < least:
+            return None
+        wide = max(section.normal for section in self.sections if section.is_wide(self.diameter))
+        several = f"at least {least}" if least <= MOST_ROWS else f"thicker bars, since {MOST_ROWS} rows are too few"
+        return (
+            f"fidelity.rows: {rows} rows side by side leave holes in bars of thickness_normal_m = {wide:g} m, which "
+            f"bars of {self.thinnest:.3g} m pass through; use {several}, or 1, a row as thick as the mean width"
+        )
 
     @property
     def widest_pitch(self) -> float:
