@@ -69,8 +69,8 @@ class Sections:
     def rows(self, *, smooth: bool, pitch: float) -> int:
         """Return the least number of strands, or rows of spheres, of the flat bars; 1 without any.
 
-        It is `MOST_ROWS` + 1 for all numbers above `MOST_ROWS`. `pitch` is the distance of neighbouring spheres along a bar over their diameter [1]; strands of `smooth` links
-        have none.
+        It is `MOST_ROWS` + 1 for all numbers above `MOST_ROWS`. `pitch` is the distance of neighbouring spheres along a
+        bar over their diameter [1]; strands of `smooth` links have none.
         """
         thinnest = self.thinnest
         impact = WANTED["standard"] * min(mean_width(section.normal, section.in_plane) for section in self.sections)
