@@ -99,6 +99,22 @@ class Sections:
             f"bars of {self.thinnest:.3g} m pass through; use {several}, or 1, a row as thick as the mean width"
         )
 
+    def overhang(self, rows: int) -> str | None:
+        """Return a warning if the axis of a thin strand may lie within a flat bar, beyond its one round strand."""
+        if self.diameter is not None:
+            return None
+        each = [(section, self._diameter(section, rows=rows > 1)) for section in self.sections]
+        thinnest = min(self.hook, *(d for _, d in each))
+        for section, d in each:
+            wide = max(section.normal, section.in_plane)
+            if not section.round and not (rows > 1 and section.is_wide(None)) and wide > d + thinnest:
+                other = "use fidelity: standard on links" if section.is_wide(None) else "compare with other sections"
+                return (
+                    f"fidelity.rows: a round strand of {d:.3g} m stands for bars {wide:g} m wide, so that the axes of "
+                    f"bars of {thinnest:.3g} m may lie within their edges; {other}"
+                )
+        return None
+
     @property
     def widest_pitch(self) -> float:
         """Largest pitch of spheres over their diameter at which no sphere or hook passes between two of one row [1].

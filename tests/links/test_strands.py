@@ -89,5 +89,3 @@ def test_bars_six_times_as_wide_as_thick_are_solid(tmp_path: Path, monkeypatch: 
 def test_the_stretched_overlap_is_that_of_contacts(depth: float) -> None:
     expected = barrier.stretch.py_func(depth * 1e-3, 1e-3)[0]
     assert strands._stretched(depth * 1e-3, 1e-3) == pytest.approx(expected, rel=1e-12)
-        barrier.stretch.py_func(depth * 1e-3, 1e-3)[0], rel=1e-12
-    )

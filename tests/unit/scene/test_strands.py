@@ -7,6 +7,7 @@ import pytest
 from scenes import small
 
 from dem.errors import InputError
+from dem.plan.doubts import doubts_of
 from dem.plan.steps import time_steps
 from dem.scene.scene import Scene
 
@@ -90,3 +91,19 @@ def test_too_few_rows_are_refused_before_a_run(changes: dict[str, Any], message:
 def test_rows_follow_anew_when_a_section_is_replaced() -> None:
     assert scene(particle=WIDE).replace(particle=STAPLE).fidelity.rows == 2
     assert scene(particle=STAPLE).replace(particle=WIDE).fidelity.rows == 5
+
+
+@pytest.mark.parametrize(
+    ("changes", "warned"),
+    [
+        ({"fidelity": "draft", "particle": [WIDE, THIN]}, True),
+        ({"fidelity": "standard", "particle": [WIDE, THIN]}, False),
+        ({"fidelity": "draft", "particle": WIDE}, False),
+        ({"fidelity": "draft", "particle": [STAPLE, THIN]}, False),
+        ({"fidelity": "draft", "hooks": {}}, False),
+    ],
+)
+def test_thin_bars_within_the_edges_of_a_round_strand_are_told(changes: dict[str, Any], warned: bool) -> None:
+    warnings = [warning for warning in doubts_of(scene(**changes)) if warning.startswith("fidelity.rows")]
+    assert len(warnings) == warned
+    assert all("0.003 m wide" in warning and "0.0002 m" in warning for warning in warnings)
