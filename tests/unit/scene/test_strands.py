@@ -40,7 +40,7 @@ def test_strands_leave_no_hole_and_are_no_more_than_before_where_there_was_none(
     changes: dict[str, Any], rows: list[int]
 ) -> None:
     made = scene(**changes)
-    assert [getattr(body, "rows", None) or body.chain.rows for body in made.bodies] == rows  # type: ignore[union-attr]
+    assert [getattr(body, "rows", None) or body.chain.rows for body in made.bodies] == rows
     time_steps(made)
 
 
