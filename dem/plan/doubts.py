@@ -1,4 +1,4 @@
-"""Warn about values that are allowed, and that are more often mistakes: angles in radians, piles like columns."""
+"""Warn about values that are allowed, and more often mistakes: angles in radians, piles like columns, edges."""
 
 import math
 from collections.abc import Iterator
@@ -16,6 +16,7 @@ _TALLEST = 4.5  # heights of poured piles over their width [1]; those of the shi
 def doubts_of(scene: Scene) -> Iterator[str]:
     """Yield a warning for each value of a scene that is probably a mistake: key, value, what to do."""
     yield from _of_angles(scene)
+    yield from filter(None, [scene.sections.overhang(scene.fidelity.rows)])
     if scene.phases[0].pours and scene.container.height_m is None:
         radius = scene.container.radius_m
         slenderness = scene.loose_height / (2 * radius)

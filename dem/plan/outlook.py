@@ -13,7 +13,7 @@ from dem.plan.steps import stable_step, time_steps
 from dem.record.sizes import MIB, MeasuringCost, measuring_cost
 from dem.scene.scene import Scene
 from dem.scene.stiffness import expected_overlaps, too_soft
-from dem.setting.fidelity import Fidelity
+from dem.setting.fidelity import Fidelity, fidelities
 from dem.setting.protocol import PARTS, PROTOCOLS, applies
 
 # Processor time to start a run, mostly imports [s]: links 2.4, YADE 3.0, measured while other work used both cores.
@@ -63,6 +63,7 @@ class Plan:
     stiffness_N_per_m: float = 0.0
     named_rows: int = 1  #: `fidelity.rows` of the named fidelity, before changes by the scene or a rule
     named_stiffness_N_per_m: float = 0.0  #: Stiffness of the named fidelity, before changes
+    usual_rows: int = 0  #: `fidelity.rows` of the named fidelity for the paper's smarticle
     bodies: str = "smarticles"  #: Noun for the bodies in texts
     strands: int = 0  #: `fidelity.rows` on the engine links; 0 on engines with spheres
     most_strands: int = 0  #: Largest number of strands of a bar on the engine links; 0 on engines with spheres
@@ -148,9 +149,10 @@ class Plan:
         named = (self.named_rows, self.named_stiffness_N_per_m)
         changed = (self.strands, self.stiffness_N_per_m) != named
         usual = f" (by name {named[0]}, {named[1]:g} N/m)" if changed else ""
+        more = ", since fewer leave holes" if self.strands == self.named_rows > self.usual_rows else ""
         return [
             f"engine {self.engine}: fidelity.rows are strands; {idle} have no meaning here",
-            f"fidelity {self.fidelity}: {_strands(self.strands)}, {self.stiffness_N_per_m:g} N/m, time step "
+            f"fidelity {self.fidelity}: {_strands(self.strands)}{more}, {self.stiffness_N_per_m:g} N/m, time step "
             f"{self.time_step_s / self.stable_time_step_s:.2g} of the stable one{usual}",
         ]
 
@@ -228,6 +230,7 @@ def plan(scene: Scene) -> Plan:
         stiffness_N_per_m=scene.fidelity.stiffness_N_per_m,
         named_rows=scene.named_knobs["rows"],
         named_stiffness_N_per_m=scene.named_knobs["stiffness_N_per_m"],
+        usual_rows=fidelities(scene.engine)[scene.fidelity.base]["rows"],
         bodies=_bodies(scene),
         strands=scene.fidelity.rows if scene.smooth else 0,
         most_strands=_most_strands(scene),

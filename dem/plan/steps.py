@@ -67,9 +67,11 @@ def time_steps(scene: Scene) -> tuple[float, ...]:
     step of a scene without motors, since their smarticles are still rigid in the initial shape. Their results are
     bitwise equal to those of that scene. Smarticles that are welded later keep the barb angles that their motors
     reached, for which the longer step is not known to be stable. In a plane, or if `fidelity.time_step_s` is given,
-    there is no exception. InputError as in `time_step`, or if a wall, hook, string or shaking moves too fast for the
-    step of its phase, or the scene cannot end, see `dem.plan.ends`.
+    there is no exception. InputError as in `time_step`, or if bars have holes, or if a wall, hook, string or shaking
+    moves too fast for the step of its phase, or the scene cannot end, see `dem.plan.ends`.
     """
+    if holes := scene.sections.holes(scene.fidelity.rows, scene.least_rows):
+        raise InputError(holes)
     count, shortest = len(scene.phases), time_step(scene)
     first = next((k for k, phase in enumerate(scene.phases) if phase.actuates), count)
     steps = (shortest,) * count

@@ -31,9 +31,10 @@ from dem.phases.take_over import TakeOver
 from dem.scene.keys import put
 from dem.scene.rules import problems
 from dem.scene.stiffness import stiffness_for
+from dem.scene.strands import Section, Sections
 from dem.setting.contact import Contact, with_preset
 from dem.setting.container import Container, Cylinder
-from dem.setting.fidelity import FIDELITIES, Fidelity, fidelities
+from dem.setting.fidelity import FIDELITIES, MOST_ROWS, Fidelity, fidelities
 from dem.setting.hooks import Hooks, with_hook_defaults
 from dem.setting.liquid import Liquid
 from dem.setting.motor import Motor
@@ -58,14 +59,34 @@ _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportio
 def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping[str, Any]:
     """Return the parameters of a named fidelity by key of `Fidelity`, adapted to a scene.
 
-    On the engine links `rows` is 1 in a plane, for t1 ≤ t2, and if a sphere diameter is given.
+    On the engine links `rows` is 1 in a plane, for t1 ≤ t2, and if a sphere diameter is given. Several rows become as
+    many as leave no hole, see `dem.scene.strands`.
 
     `given` are parts of the scene that are validated already, by name; `diameter` is `fidelity.diameter_m` or None.
     """
     engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
+    named = fidelities(engine)[base]
     narrow = smarticle.thickness_normal_m <= smarticle.thickness_in_plane_m
     single = given.get("plane") is not None or narrow or diameter is not None
-    return {**fidelities(engine)[base], **({"rows": 1} if engine == "links" and single else {})}
+    if engine == "links" and single:
+        return {**named, "rows": 1}
+    if named["rows"] == 1:
+        return named
+    least = _sections(given, None).rows(smooth=engine == "links", pitch=named["pitch"])
+    return {**named, "rows": min(max(named["rows"], least), MOST_ROWS)}
+
+
+def _sections(given: Mapping[str, Any], diameter: float | None) -> Sections:
+    """Return the sections of all bodies, from parts of the scene that are validated already, by name.
+
+    `diameter` is `fidelity.diameter_m`.
+    """
+    shapes = [shape for shape in given.get("particle") or () if not shape.absent]
+    found = [Section.of(shape.bars(), single=isinstance(shape, Chain)) for shape in shapes]
+    smarticle, hooks = given.get("smarticle") or Smarticle(), given.get("hooks")
+    own = Section(normal=smarticle.thickness_normal_m, in_plane=smarticle.thickness_in_plane_m)
+    hook = math.inf if hooks is None else hooks.side_m
+    return Sections(sections=found or [own], diameter=diameter, hook=hook)
 
 
 class Scene(Part, Shown):
@@ -371,7 +392,7 @@ class Scene(Part, Shown):
             return in_plane
         width = in_plane if disc else mean_width(normal, in_plane)
         # A smooth round bar touches others at its own diameter, which chains of spheres do not.
-        return width if self.smooth else width / chain_mean_width(self.fidelity.pitch)
+        return width if self.smooth else width / chain_mean_width(self._pitch)
 
     def seed_for(self, purpose: str) -> int:
         """Return a 64-bit seed for one purpose, derived from the scene's seed alone.
@@ -447,9 +468,19 @@ class Scene(Part, Shown):
         chain = SphereChain(rows=self.fidelity.rows, diameter=diameter, pitch=self._pitch * diameter)
         return Particle(self.smarticle.boxes, chain)
 
+    @cached_property
+    def sections(self) -> Sections:
+        """Sections of all bodies, with the thinnest bars of the hooks."""
+        return _sections(dict(self), self.fidelity.diameter_m)
+
     @property
+    def least_rows(self) -> int:
+        """Least `fidelity.rows` above 1 that leave no hole in flat bars, see `dem.scene.strands`; 1 without any."""
+        return self.sections.rows(smooth=self.smooth, pitch=self._pitch)
+
+    @cached_property
     def _pitch(self) -> float:
-        return SMOOTH_PITCH if self.smooth else self.fidelity.pitch
+        return SMOOTH_PITCH if self.smooth else min(self.fidelity.pitch, self.sections.widest_pitch)
 
     @cached_property
     def mixture(self) -> Mixture | None:
@@ -473,8 +504,8 @@ class Scene(Part, Shown):
         normal, in_plane = bars.thickness_normal, bars.thickness_in_plane
         linkage = shape.linkage(factor, bars) if isinstance(shape, Chain) else None
         # Rows have a meaning only across the wide side of a flat section; links of a chain have one.
-        wide = normal > (self.fidelity.diameter_m or in_plane) and not bars.round and linkage is None
-        rows = self.fidelity.rows if wide else 1
+        section = Section.of(bars, single=isinstance(shape, Chain))
+        rows = self.fidelity.rows if section.is_wide(self.fidelity.diameter_m) else 1
         diameter, pitch = self._diameter_of(normal, in_plane, rows, disc=bars.round), self._pitch
         filament = None
         if isinstance(shape, Flexible):  # of cylinders on every engine

@@ -7,6 +7,8 @@ from pydantic import Field
 
 from dem.setting.part import Length, Part, Stiffness
 
+MOST_ROWS = 32  # pairs of strands then cost 28 times as much as with two, see `dem.engine.links.cost`
+
 
 class Fidelity(Part):
     """Numerical parameters that trade accuracy for cost; none of them changes mass or inertia."""
@@ -14,7 +16,13 @@ class Fidelity(Part):
     base: Literal["draft", "standard", "reference"] = Field(
         "standard", description="named fidelity that gives the default of all other parameters"
     )
-    rows: int = Field(..., ge=1, le=4, description="rows of spheres across t1, the thickness along the normal [1]")
+    rows: int = Field(
+        ...,
+        ge=1,
+        le=MOST_ROWS,
+        description="rows of spheres, or strands, across t1, the thickness along the normal [1]; the default of "
+        "standard and reference leaves no hole for the thinnest body",
+    )
     diameter_m: Length | None = Field(
         None,
         description="sphere diameter [m]; default with one row: such that two crossing chains touch at the mean "

@@ -90,7 +90,7 @@ def test_a_reason_about_barbs_is_about_bodies_that_have_some() -> None:
 def test_knobs_are_compared_with_those_of_the_name_in_this_scene() -> None:
     narrow = {"engine": "links", "fidelity": "standard", "smarticle": {"thickness_normal_m": 5e-4}}
     assert "fidelity standard: 1 strand, 1000 N/m, time step 0.92 of the stable one\n" in plan(small(narrow)).to_text()
-    two = plan(small({"engine": "links", "fidelity": {"base": "standard", "rows": 2, "diameter_m": 4e-4}})).to_text()
+    two = plan(small({"engine": "links", "fidelity": {"base": "standard", "rows": 2, "diameter_m": 5e-4}})).to_text()
     assert "fidelity standard: 2 strands, 1000 N/m, time step 0.92 of the stable one (by name 1, 1000 N/m)\n" in two
 
 
