@@ -115,9 +115,8 @@ class Phase:
         """
         return None
 
-    @property
-    def origin(self) -> Mapping[str, Any] | None:
-        """Data about the other run from which smarticles are taken, for the manifest; None if none are."""
+    def origin(self, scene: SceneView) -> Mapping[str, Any] | None:
+        """Return data about the other run from which smarticles are taken, for the manifest; None if none are."""
         return None
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:

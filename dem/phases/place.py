@@ -108,11 +108,10 @@ class Place(Part, Phase):
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
         if stage.memory["put"]:
-            # Contacts are known from the first step on.
-            engine.ledger.take_in()
             return 0.0
         stage.memory["put"] = True
         engine.add(self._poses(stage.scene))
+        engine.ledger.take_in()
         return engine.time_step
 
     def _poses(self, scene: SceneView) -> Poses:
