@@ -30,13 +30,13 @@ from dem.setting.container import Cylinder
 from dem.setting.hooks import Cross
 
 DEEP = 0.05  # of a diameter; contacts of piles at rest are less deep, and `place` accepts as much
-# Of a diameter: what may be left of an overlap. At standard its spring can lift a smarticle by a tenth of a diameter.
-LEFT = 0.01
+LEFT = 0.01  # of a diameter: what may be left of an overlap; its spring can lift a smarticle by 0.04 of a diameter
 STRIDE = 0.2  # of a radius, by which a point moves at most in a sweep: no axis can jump over another one
-# Factor on the mean of what the overlaps of a body ask for; sweeps converge below 2, fastest near it.
-OVER = 1.9
+# Part of its last displacement that a body repeats while it overlaps: six times fewer sweeps in a pile of 60, in which
+# smarticles are then displaced by 3 % more on average.
+CARRIED = 0.8
 SKIN = 1.0  # in diameters; pairs of links that are nearer are listed, until a point may have moved by half of it
-SWEEPS = 5000  # piles of 9 to 60 need 40 to 470
+SWEEPS = 5000  # piles of 9 to 270 need 20 to 700
 TOO_NEAR = 0.02  # of a diameter; centre lines that are nearer do not tell which side is which
 
 
@@ -128,6 +128,7 @@ class _Pile:
         self._reach = particle.reach
         self.positions = poses.positions.copy()
         self.turns = np.array([rotation.as_matrix() for rotation in poses.rotations])
+        self._last = np.zeros((len(self.positions), 6))  # displacements and angles of the last sweep [m, rad]
         self._cylinder = cylinder
         self._bars = _faces_of(hooks)
         self._moved = math.inf  # bound of the way of any point since pairs were listed [m]
@@ -217,7 +218,7 @@ class _Pile:
         return [_touching(_Met(body, np.full_like(body, -1), points, normals, depths)) for depths, normals in found]
 
     def push(self, met: _Met) -> None:
-        """Move all bodies that overlap, each by `OVER` times the mean of what its overlaps ask for."""
+        """Move all bodies that overlap, each by the mean of what its overlaps ask for."""
         inverse = matrix_product(self.turns * self._inverse_inertia, np.swapaxes(self.turns, 1, 2))
         asked, gives = [], np.zeros(len(met.depths))
         for body, sign in ((met.first, 1.0), (met.second, -1.0)):
@@ -232,11 +233,13 @@ class _Pile:
             overlaps += np.bincount(body, minlength=len(overlaps))
             for d, column in enumerate((pushes * ways)[free].T):
                 moves[:, d] += np.bincount(body, weights=column, minlength=len(overlaps))
-        moves *= (OVER / np.maximum(1.0, overlaps))[:, None]
+        moves /= np.maximum(1.0, overlaps)[:, None]
+        moves += CARRIED * self._last * (overlaps > 0)[:, None]
         most = np.sqrt((moves[:, :3] ** 2).sum(axis=1)) + self._reach * np.sqrt((moves[:, 3:] ** 2).sum(axis=1))
         share = np.minimum(1.0, STRIDE * self._radius / np.maximum(most, 1e-300))
         self._moved += float((share * most).max())
         moves *= share[:, None]
+        self._last = moves
         self.positions = self.positions + moves[:, :3]
         self.turns = matrix_product(_turns_by(moves[:, 3:]), self.turns)
 
