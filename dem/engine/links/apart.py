@@ -37,6 +37,7 @@ STRIDE = 0.2  # of a radius, by which a point moves at most in a sweep: no axis 
 CARRIED = 0.8
 SKIN = 1.0  # in diameters; pairs of links that are nearer are listed, until a point may have moved by half of it
 SWEEPS = 5000  # piles of 9 to 270 need 20 to 700
+PARALLEL = 1e-6  # of its largest value: squared sine of an angle below which segments count as parallel
 TOO_NEAR = 0.02  # of a diameter; centre lines that are nearer do not tell which side is which
 
 
@@ -225,19 +226,24 @@ class _Pile:
             free = body >= 0
             moments = _cross(met.places - self.positions[body], met.normals)
             turning = matrix_product(inverse[body], moments[..., None])[..., 0]
-            gives += np.where(free, 1.0 + (moments * turning).sum(axis=1), 0.0)
-            asked.append((body[free], free, sign * np.concatenate([met.normals, turning], axis=1)))
-        pushes = (met.depths / gives)[:, None]
+            own = np.where(free, 1.0 + (moments * turning).sum(axis=1), 0.0)
+            gives += own
+            asked.append((body[free], free, own, sign * np.concatenate([met.normals, turning], axis=1)))
+        pushes = met.depths / gives
         moves, overlaps = np.zeros((len(self.positions), 6)), np.zeros(len(self.positions))
-        for body, free, ways in asked:
+        limits = np.zeros(len(self.positions))
+        for body, free, own, ways in asked:
             overlaps += np.bincount(body, minlength=len(overlaps))
-            for d, column in enumerate((pushes * ways)[free].T):
+            np.maximum.at(limits, body, (own * pushes)[free])
+            for d, column in enumerate((pushes[:, None] * ways)[free].T):
                 moves[:, d] += np.bincount(body, weights=column, minlength=len(overlaps))
         moves /= np.maximum(1.0, overlaps)[:, None]
-        moves += CARRIED * self._last * (overlaps > 0)[:, None]
-        most = np.sqrt((moves[:, :3] ** 2).sum(axis=1)) + self._reach * np.sqrt((moves[:, 3:] ** 2).sum(axis=1))
-        share = np.minimum(1.0, STRIDE * self._radius / np.maximum(most, 1e-300))
-        self._moved += float((share * most).max())
+        moves += CARRIED * self._last
+        ways, turns = (np.sqrt((part**2).sum(axis=1)) for part in (moves[:, :3], moves[:, 3:]))
+        longest = ways + self._reach * turns  # an upper bound of the way of any point
+        # No further than the deepest overlap asks for, so that what is carried on does not push bodies too far apart.
+        share = np.minimum(1.0, np.minimum(limits, STRIDE * self._radius) / np.maximum(longest, 1e-300))
+        self._moved += float((share * longest).max())
         moves *= share[:, None]
         self._last = moves
         self.positions = self.positions + moves[:, :3]
@@ -263,9 +269,12 @@ def _nearest(p: Array, u: Array, q: Array, v: Array) -> _Near:
     w = p - q
     a, b, c, d, e = ((x * y).sum(axis=1) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
     determinant = a * c - b * b
-    crossing = determinant > 1e-12 * a * c
-    s = np.where(crossing, (b * e - c * d) / np.where(crossing, determinant, 1.0), 0.0)
-    t = np.clip((b * np.clip(s, 0.0, 1.0) + e) / c, 0.0, 1.0)
+    crossing = determinant > PARALLEL * a * c
+    s = (b * e - c * d) / np.where(crossing, determinant, 1.0)
+    # Along parallel segments the middle of the stretch where they are beside each other, so that they do not tilt.
+    stretch = np.clip(np.stack([-e, c - e]) / np.where(crossing, 1.0, b), 0.0, 1.0)
+    s = np.clip(np.where(crossing, s, stretch.mean(axis=0)), 0.0, 1.0)
+    t = np.clip((b * s + e) / c, 0.0, 1.0)
     s = np.clip((b * t - d) / a, 0.0, 1.0)
     one, other = p + s[:, None] * u, q + t[:, None] * v
     gaps = one - other
