@@ -33,6 +33,7 @@ class Place(Part, Phase):
     """Put all bodies at poses from a file, at rest; this takes one time step."""
 
     begins: ClassVar[bool] = True
+    overlap: ClassVar[float] = MOST_OVERLAP
     needs_links: ClassVar[str] = "start poses from a file"
     sources: ClassVar[frozenset[str]] = frozenset({"file"})
     type: Literal["place"]
