@@ -339,7 +339,10 @@ class EnergyLedger(Protocol):
         """Return the elastic energy of all contacts, and that of all hinges and flexible bodies [J]."""
 
     def take_in(self) -> None:
-        """Add the present elastic energy of contacts to `added`; called if bodies overlapped when added."""
+        """Add the elastic energy of contacts to `added`; called when all bodies were added and may overlap.
+
+        Engines that find contacts in a step add the energy after the next step.
+        """
 
 
 class Engine(Protocol):

@@ -83,6 +83,8 @@ class Phase:
     pours: ClassVar[bool] = False  #: Whether the phase pours bodies
     frees: ClassVar[bool] = False  #: Whether the phase takes the container away
     lets_go: ClassVar[bool] = False  #: Whether the phase releases all that earlier phases grip
+    overlap: ClassVar[float] = 0.0
+    """Largest overlap of bodies that the phase puts at given poses, in diameters, from which contacts throw them."""
     needs_links: ClassVar[str] = ""  #: What of the phase only the engine links computes, in words; "": nothing
     planar: ClassVar[bool | None] = False
     """Whether the phase is possible in a plane only (True), in a container only (False), or in both (None)."""
@@ -115,9 +117,8 @@ class Phase:
         """
         return None
 
-    @property
-    def origin(self) -> Mapping[str, Any] | None:
-        """Data about the other run from which smarticles are taken, for the manifest; None if none are."""
+    def origin(self, scene: SceneView) -> Mapping[str, Any] | None:
+        """Return data about the other run from which smarticles are taken, for the manifest; None if none are."""
         return None
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:

@@ -35,6 +35,7 @@ class Place(Part, Phase):
     """Put all bodies at poses from a file, at rest; this takes one time step."""
 
     begins: ClassVar[bool] = True
+    overlap: ClassVar[float] = MOST_OVERLAP
     needs_links: ClassVar[str] = "start poses from a file"
     sources: ClassVar[frozenset[str]] = frozenset({"file"})
     type: Literal["place"]
@@ -126,11 +127,10 @@ class Place(Part, Phase):
 
     def proceed(self, stage: Stage, engine: Engine) -> float:
         if stage.memory["put"]:
-            # Contacts are known from the first step on.
-            engine.ledger.take_in()
             return 0.0
         stage.memory["put"] = True
         engine.add(self._poses(stage.scene))
+        engine.ledger.take_in()
         return engine.time_step
 
     def _poses(self, scene: SceneView) -> Poses:

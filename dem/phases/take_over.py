@@ -2,7 +2,8 @@
 
 A frame holds exact poses, but no contacts: tangential springs are lost, and smarticles begin at rest. On
 another engine, or at another fidelity, these poses may overlap: spheres of one chain lie partly in the gaps of another
-chain, smooth links do not. Such overlaps are reduced first, by steps in which velocities are often set to zero.
+chain, smooth links do not. Smooth links are first pushed apart where they overlap by more than contacts at rest do.
+What is left of overlaps is reduced by steps in which velocities are often set to zero.
 """
 
 import hashlib
@@ -20,7 +21,7 @@ from dem.arrays import Array, Flags
 from dem.body.linear import by_element
 from dem.body.placement import Poses, fitted_poses
 from dem.engine.interface import Engine
-from dem.errors import InputError, RunError, shown
+from dem.errors import InputError, RunError, reject, shown
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Settle, Stage, begin_wait, has_settled
 from dem.record.frame import Frame
 from dem.record.run import Run, open_run
@@ -30,6 +31,7 @@ from dem.setting.part import Part, ScenePath, Sha256
 LAST = "last"  # the frame at the end of a run that is done
 TAKEN_SECONDS = 0.05  # s, typical time in which a pile that was taken over comes to rest
 STRIDE = 10  # steps between checks whether overlapping smarticles fly apart, about one oscillation of a contact
+MOST_PUSHED = 0.5  # of the middle link's length; smarticles that are pushed further are not those of the frame
 # Largest distance of a recorded vertex from the vertex of the scene's shape that is fitted to it, in sphere diameters.
 # On YADE hinges give way by 0.01 in a pile, and contacts at rest are as deep, so that fits add no larger overlaps.
 MOST_OFF = 0.02
@@ -62,6 +64,27 @@ class Taken:
 
     def __str__(self) -> str:
         return f"frame {self.number} of {self.run.path}"
+
+
+@dataclass(frozen=True)
+class Start:
+    """Poses with which a scene starts, and how they differ from those of the frame."""
+
+    poses: Poses
+    overlap: float = 0.0  #: Largest overlap before smarticles were pushed apart [m]; 0: none was pushed
+    mean: float = 0.0  #: Mean over the smarticles of their largest displacements [m]
+    most: float = 0.0  #: Largest displacement [m]
+    rise: float = 0.0  #: Mean rise of the centres of mass [m]
+
+    @property
+    def described(self) -> str:
+        """The displacement in words; "" if no smarticle was pushed."""
+        if not self.overlap:
+            return ""
+        return (
+            f"overlap by up to {1e3 * self.overlap:.2g} mm as this scene has its links (engine, fidelity): smarticles "
+            f"are pushed apart first, by {1e3 * self.mean:.2g} mm on average and {1e3 * self.most:.2g} mm at most"
+        )
 
 
 def take(path: Path, frame: int | str) -> Taken:
@@ -158,11 +181,23 @@ class TakeOver(Part, Phase):
             taken = self.taken
         except InputError as error:
             raise InputError(f"phases.0.{error}") from None
-        poses_of(scene, taken)
+        for mismatch in _mismatches(scene, taken):
+            raise InputError(mismatch)
+        self.start(scene)
 
-    @property
-    def origin(self) -> Mapping[str, Any]:
-        taken = self.taken
+    @cached_property
+    def _started(self) -> list[tuple[SceneView, Start]]:
+        """The scene for which `start` was called last, and the result, which takes seconds to compute."""
+        return []
+
+    def start(self, scene: SceneView) -> Start:
+        """Return the poses with which a scene starts; InputError if smarticles cannot be pushed apart."""
+        if not self._started or self._started[0][0] is not scene:
+            self._started[:] = [(scene, _start(scene, self.taken))]
+        return self._started[0][1]
+
+    def origin(self, scene: SceneView) -> Mapping[str, Any]:
+        taken, start = self.taken, self.start(scene)
         return {
             "run": self.run,
             "frame": self.frame,
@@ -172,6 +207,9 @@ class TakeOver(Part, Phase):
             "scene_sha256": taken.run.manifest.scene_sha256,
             "seed": taken.run.manifest.seed,
             "engine": taken.run.manifest.engine,
+            "overlap_m": start.overlap,
+            "pushed_mean_m": start.mean,
+            "pushed_most_m": start.most,
         }
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
@@ -179,13 +217,19 @@ class TakeOver(Part, Phase):
             taken = self.taken
         except InputError:
             return ()
-        limit = self.settle.speed_m_per_s
-        if taken.fastest < limit:
-            return ()
-        return (
-            f"phases.0.frame: {taken} is not at rest, up to {taken.fastest:.3g} m/s (settle.speed_m_per_s is {limit:g} "
-            "m/s), and velocities are not taken over; use a frame at the end of a relax phase",
-        )
+        limit, found = self.settle.speed_m_per_s, []
+        if taken.fastest >= limit:
+            found.append(
+                f"phases.0.frame: {taken} is not at rest, up to {taken.fastest:.3g} m/s (settle.speed_m_per_s is "
+                f"{limit:g} m/s), and velocities are not taken over; use a frame at the end of a relax phase"
+            )
+        try:
+            pushed = self.start(scene).described
+        except InputError as error:  # `ready` rejects the scene before a run
+            return (*found, str(error))
+        if pushed:
+            found.append(f"phases.0.run: poses of {taken} {pushed}; for less pour on the same engine and fidelity")
+        return found
 
     def expected_duration(self, scene: SceneView) -> float:
         # Nothing falls: the pile settles in little more than `hold_s`.
@@ -207,16 +251,18 @@ class TakeOver(Part, Phase):
         memory, settle, stride = stage.memory, self.settle, STRIDE * engine.time_step
         if memory["task"] == "put":
             self.ready(stage.scene)
-            engine.add(poses_of(stage.scene, self.taken))
-            memory.update(task="count", height=_mean_height(engine))
+            start = self.start(stage.scene)
+            engine.add(start.poses)
+            engine.ledger.take_in()
+            memory.update(task="count", height=_mean_height(engine) - start.rise)
             return engine.time_step
         if memory["task"] == "count":
-            # Contacts are known from the first step on.
-            engine.ledger.take_in()
+            # Some engines find contacts in the first step only, which therefore belongs to no stride.
             memory["task"] = "let apart"
             return stride
         if memory["task"] == "let apart":
             fastest = float(engine.state().speeds.max())
+            _reject_thrown(engine, stride, stage.scene.sphere_diameter)
             if fastest > settle.speed_m_per_s + stride * engine.gravity:
                 if memory["waited"] > settle.timeout_s:
                     raise RunError(
@@ -239,6 +285,49 @@ class TakeOver(Part, Phase):
 
 def _mean_height(engine: Engine) -> float:
     return float(engine.state().positions[:, 2].mean())
+
+
+def _reject_thrown(engine: Engine, time: float, diameter: float) -> None:
+    """Raise RunError if smarticles have moved by more than a diameter [m] in the time since they were at rest [s]."""
+    speeds = engine.state().speeds
+    reject(
+        speeds * time > diameter,
+        engine.time,
+        f"overlap so much where they were put in that contacts throw them apart, at up to {speeds.max():.3g} m/s "
+        f"within {STRIDE} steps, so that links may have passed through each other",
+        "take over on the engine and at the fidelity of phases.0.run first, or pour on this engine",
+    )
+
+
+def _start(scene: SceneView, taken: Taken) -> Start:
+    """Return the poses with which a scene starts; InputError if smarticles cannot be pushed apart."""
+    poses = poses_of(scene, taken)
+    if not scene.smooth:
+        return Start(poses)
+    # Numba, which this module imports, takes half a second to load.
+    from dem.engine.links.apart import pushed_apart  # noqa: PLC0415
+
+    way_out = "take over a run of this engine and fidelity, or pour here"
+    try:
+        pushed = pushed_apart(scene.body, poses, scene.cylinder, scene.hooks.crosses if scene.hooks else ())
+    except InputError as error:
+        msg = f"phases.0.run: smarticles of {taken} cannot be pushed apart as links: {error}; {way_out}"
+        raise InputError(msg) from None
+    if pushed is None:
+        return Start(poses)
+    rise = float((pushed.poses.positions - poses.positions)[:, 2].mean())
+    start = Start(pushed.poses, pushed.deepest, float(pushed.distances.mean()), float(pushed.distances.max()), rise)
+    limit = MOST_PUSHED * scene.body.size
+    if start.most > limit:
+        raise InputError(
+            f"phases.0.run: poses of {taken} {start.described}; at most {1e3 * limit:.3g} mm are allowed: {way_out}"
+        )
+    if pushed.highest > scene.cylinder.height:
+        raise InputError(
+            f"container.height_m: {scene.cylinder.height:.4g} m, but the smarticles of {taken} {start.described}, and "
+            f"then reach {pushed.highest:.4g} m; use a higher container"
+        )
+    return start
 
 
 def poses_of(scene: SceneView, taken: Taken) -> Poses:

@@ -130,7 +130,7 @@ def build_watchdog(scene: Scene) -> Watchdog:
     mass, masses = scene.count * scene.model.mass, [body.mass for body in scene.bodies]
     return Watchdog(
         cylinder=scene.cylinder,
-        speed=max(SPEED_MARGIN, math.sqrt(max(masses) / min(masses))) * max(fall, fastest),
+        speed=max(SPEED_MARGIN, math.sqrt(max(masses) / min(masses))) * max(fall, fastest, speed_by_overlap(scene)),
         way_out=DAMP_SHAFTS if _rings(scene) else LOWER_STEP,
         gap=(PIN_LIMIT if scene.mixture is not None and scene.mixture.jointed else GAP_LIMIT) * diameter,
         depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,
@@ -139,6 +139,19 @@ def build_watchdog(scene: Scene) -> Watchdog:
         # Without gravity no height corresponds to an energy.
         energy=mass * max(RISE_LIMIT * diameter * gravity, KEPT_WITHIN * fastest**2 / 2) if gravity else math.inf,
     )
+
+
+def speed_by_overlap(scene: Scene) -> float:
+    """Return the speed [m/s] that a contact gives to the lightest point of a body in the poses with which a run begins.
+
+    The contact is as deep as these poses may overlap, δ; the speed is δ √(kn/m).
+    """
+    lightest = min(
+        body.smallest_effective_mass if body.filament is None else float(body.filament.masses.min())
+        for body in scene.bodies
+    )
+    depth = scene.phases[0].overlap * scene.sphere_diameter
+    return depth * math.sqrt(scene.fidelity.stiffness_N_per_m / lightest)
 
 
 def _rings(scene: Scene) -> bool:

@@ -261,7 +261,7 @@ def manifest(
 
     `steps` are the time steps of each phase [s], `made_by` name and version of the engine.
     """
-    model, origin = scene.model, scene.phases[0].origin
+    model, origin = scene.model, scene.phases[0].origin(scene)
     boxes = None if isinstance(model, Mixture) else model.boxes
     start = start_of(command=command, made_by=made_by, threads=threads)
     if origin is not None:  # a relative path stays right if both runs are moved together

@@ -181,11 +181,12 @@ class Watchdog:
             residual: energy added and work done, less all energy stored and dissipated [J].
             dissipated: energy dissipated by contacts, hinges and welding since the start [J].
         """
-        if not abs(residual) > WARNED_FRACTION * self.missed * dissipated > 0.0:
+        # A fraction of next to nothing has no meaning: the limit is at least that of an unexplained rise of the energy.
+        limit = self.missed * dissipated + (self.energy if math.isfinite(self.energy) else 0.0)
+        if not abs(residual) > WARNED_FRACTION * limit > 0.0:
             return None
-        share = 100 * abs(residual) / dissipated
+        share = 100 * abs(residual) / dissipated if dissipated else math.inf
         text = f"the energy ledger misses {residual:.3g} J, {share:.2g} % of the {dissipated:.3g} J dissipated"
-        # At the beginning, when next to nothing was dissipated, a fraction has no meaning.
-        if abs(residual) > self.missed * dissipated + (self.energy if math.isfinite(self.energy) else 0.0):
+        if abs(residual) > limit:
             raise RunError(f"at t = {time:.4f} s {text} (limit {100 * self.missed:.2g} %); {LOWER_STEP}")
         return f"{text}; {LOWER_STEP}"

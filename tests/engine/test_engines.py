@@ -34,16 +34,22 @@ def test_poses_are_handed_over_and_the_pile_stays(
     worker: ProcessPoolExecutor, pours: dict[str, str], poured: str, onto: str
 ) -> None:
     taken: dict[str, Any] = worker.submit(taking.taken_over, onto, pours[poured]).result(TIMEOUT)
-    assert taken["off"] < 1e-15  # rounding of 0.1 m
     assert taken["speeds"] == 0
     moved = taken["moved"] / taken["diameter"]
     if poured == onto:
         assert taken["stops"] == 0
+        assert taken["off"] < 1e-15  # rounding of 0.1 m
         # Only springs of friction begin anew: at most 0.006 diameters in 3 piles of 60 at standard, on either engine.
         assert 0 < moved.max() < 0.03
+    elif onto == "links":
+        # Beads reach into valleys that links do not have. Links are pushed apart before the first step.
+        assert taken["stops"] == 0
+        assert taken["off"] > 0.1 * taken["diameter"]
+        assert 0.01 < moved.mean() < 0.3
     else:
-        # Beads reach into valleys that links do not have: in 6 piles of 60 it moved by 0.10 to 0.15 diameters on
-        # average, and by 0.42 to 0.56 where nothing stopped what overlapped.
+        # In 6 piles of 60 it moved by 0.10 to 0.15 diameters on average, and by 0.42 to 0.56 where nothing stopped what
+        # overlapped.
+        assert taken["off"] < 1e-15
         assert taken["stops"] > 0
         assert 0.01 < moved.mean() < 0.3
         assert abs(taken["rise"]) < 0.15 * taken["diameter"]

@@ -49,6 +49,7 @@ class LinksLedger:
         return self._world.contacts().elastic_energy, self.deformation
 
     def take_in(self) -> None:
+        self._world.list_near()
         self.added += self.elastic()[0]
 
     def removed(self, remove: Callable[[], None]) -> None:

@@ -64,6 +64,7 @@ from dem.engine.links.motion.bending import pose_filaments_from_python
 from dem.engine.links.motion.joining import pose_linkages_from_python
 from dem.engine.links.motion.planar import invert, lay_out
 from dem.engine.links.motion.poses import find_links, pose_all
+from dem.engine.links.neighbours.lists import FULL, build_from_python
 from dem.engine.links.rods import apart, filaments_at, none_of
 from dem.engine.links.shapes import LINE, RADIUS, Shape, kind_shape, link_shapes, smarticle_shape, table_of
 from dem.engine.links.stepping import PAST, Clock, advance
@@ -524,11 +525,21 @@ class World:
         find_links(bodies, self.parts, 3 if self.articulated else 1, places, frames, velocities, spins)
         return State(self.particle.boxes, places, frames, velocities, spins)
 
+    def list_near(self) -> None:
+        """Build the wide list for bodies that have just been added, so that `contacts` finds theirs.
+
+        The next step builds it again.
+        """
+        self.posed()
+        while build_from_python(self.bodies, self.segments, self.pairs, self.cells, self.skins) == FULL:
+            self.make_room(int(GROWTH * len(self.pairs.first)))
+        self.forget_places()
+
     def contacts(self) -> Contacts:
         """Return all present contacts; the simulation is not changed.
 
         Contacts between bodies are found in the wide list of `pairs`, which is still valid after the last step. It
-        lacks contacts of bodies that were added after this step.
+        lacks contacts of bodies that were added after this step, unless `list_near` was called.
         """
         self.posed()
         found, count, energy = self._query()

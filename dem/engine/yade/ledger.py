@@ -101,6 +101,7 @@ class YadeLedger:
         self._works = works
         self._interval = dissipation_interval
         self._time_step, self._every = 0.0, 0
+        self._owed = False  # whether the next step finds contacts of which `take_in` was told
 
     def set_time_step(self, time_step: float) -> None:
         """Set the length of all further steps [s]."""
@@ -118,6 +119,9 @@ class YadeLedger:
             if hinges is not None:
                 loss += hinges.damped(self._time_step)
             self.dissipated += self._every * loss
+        if self._owed:
+            self._owed = False
+            self.added += self.elastic()[0]
         if self._works and self._boundaries.moving:
             self.container_work += self._boundaries.power() * self._time_step
 
@@ -125,7 +129,7 @@ class YadeLedger:
         return self._contacts({}).elastic_energy, self._assembly.elastic_energy()
 
     def take_in(self) -> None:
-        self.added += self.elastic()[0]
+        self._owed = True
 
     @property
     def given(self) -> float:

@@ -227,11 +227,12 @@ class Pushing(EngineDouble):
     """Smarticles that overlap so much that all fly apart, until they were stopped so many times."""
 
     stops = 0
+    speed = 0.3  # m/s
 
     def advance(self, steps: int) -> None:
         super().advance(steps)
         if self.calls.count(("still",)) < self.stops:
-            self.velocities[:, 0] = 0.3
+            self.velocities[:, 0] = self.speed
 
 
 def perform(scene: Scene, engine: Engine) -> dict[str, Any]:
@@ -271,6 +272,21 @@ def test_what_never_comes_apart_fails(pour: Path) -> None:
     ):
         perform(scene, engine)
     assert engine.time < 0.11
+
+
+def test_what_is_thrown_by_its_overlaps_fails_with_that_cause(pour: Path) -> None:
+    scene = scene_of(pour)
+    engine = Pushing.of(scene, DT)
+    assert isinstance(engine, Pushing)
+    engine.stops, engine.speed = 10**6, 1190.0
+    with pytest.raises(RunError) as caught:
+        perform(scene, engine)
+    text = str(caught.value)
+    assert "overlap so much where they were put in that contacts throw them apart, at up to 1.19e+03 m/s" in text
+    assert text.endswith("; take over on the engine and at the fidelity of phases.0.run first, or pour on this engine")
+    assert "height" not in text
+    assert "stiffness" not in text
+    assert engine.steps == 1 + STRIDE
 
 
 def test_links_in_any_bar_of_a_hook_are_found() -> None:

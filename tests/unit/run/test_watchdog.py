@@ -164,6 +164,34 @@ def test_energy_from_nowhere_stops_the_run() -> None:
     )
 
 
+LEDGER = Watchdog(cylinder=WATCHDOG.cylinder, speed=5.0, energy=4e-7, missed=0.05)
+
+
+@pytest.mark.parametrize(
+    ("residual", "dissipated", "verdict"),
+    [
+        (5.1e-10, 2.56e-9, "good"),  # a fifth of next to nothing, which lifts a pile by a thousandth of a diameter
+        (7e-8, 0.0, "good"),
+        (9e-8, 0.0, "warned"),
+        (9e-8, 2.56e-9, "warned"),
+        (-3e-7, 1e-5, "warned"),
+        (4.1e-7, 0.0, "stopped"),
+        (1.26e-4, 1.8e-4, "stopped"),
+        (6e-5, 1e-3, "stopped"),
+    ],
+)
+def test_the_ledger_is_judged_by_what_was_dissipated_and_by_a_height(
+    residual: float, dissipated: float, verdict: str
+) -> None:
+    # 20 % of the limits: 5 % of the dissipation, and the energy that lifts all by half a diameter.
+    if verdict == "stopped":
+        with pytest.raises(RunError, match="the energy ledger misses"):
+            LEDGER.check_residual(residual, dissipated=dissipated, time=1.25)
+        return
+    warning = LEDGER.check_residual(residual, dissipated=dissipated, time=1.25)
+    assert (warning is None) == (verdict == "good")
+
+
 def at(*position: float) -> State:
     still = np.zeros((1, 3))
     return State.rigid(BOXES, np.array([position], dtype=float), np.eye(3)[None], still, still)

@@ -7,7 +7,7 @@ depends on positions only. The memory of a contact stays with its pair when a li
 from __future__ import annotations
 
 from dem.engine.links.arrays import Array, Bodies, Cells, Pairs, Segments
-from dem.engine.links.compiler import inlined, part
+from dem.engine.links.compiler import inlined, kernel, part
 from dem.engine.links.neighbours.search import near_each_other, off_lines, search
 from dem.engine.links.neighbours.skins import mark, moved
 from dem.engine.links.shapes import RADIUS
@@ -87,6 +87,12 @@ def build(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells, skins:
     pairs.counts[0] = found
     pairs.counts[2] += 1
     return GOOD
+
+
+@kernel
+def build_from_python(bodies: Bodies, segments: Segments, pairs: Pairs, cells: Cells, skins: Array) -> int:
+    """Rebuild the wide list; for arguments and result see `build`."""
+    return build(bodies, segments, pairs, cells, skins)
 
 
 @inlined
