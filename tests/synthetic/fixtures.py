@@ -44,7 +44,7 @@ def make_run(tmp_path_factory):
             times = 0.1 * np.arange(len(plan))
             columns = {
                 "time_s": times,
-                "phase": np.zeros(len(times), dtype=int),
+                "phase": np.array([phase for phase, _ in plan]),
                 "kinetic_energy_J": 10.0 * times,
                 "unbalanced_force": 1.0 - times,
                 "container_force_N": np.outer(times, [1.0, 2.0, 3.0]),
