@@ -232,7 +232,7 @@ def of_phase(table: pd.DataFrame, phase: str | int) -> pd.DataFrame:
         chosen = table["phase"] == phase
         if isinstance(phase, bool) or not chosen.any():
             numbers = ", ".join(str(number) for number in sorted(set(table["phase"])))
-            raise InputError(f"phase: no run has begun a phase {shown(phase)}; known: {numbers}")
+            raise InputError(f"phase: no run has begun phase {shown(phase)}; known: {numbers}")
         return table[chosen].reset_index(drop=True)
     if phase == "last":
         return table[table["phase"] == table.groupby("run")["phase"].transform("max")].reset_index(drop=True)
