@@ -1,10 +1,12 @@
 """Choose the frames and the speed of films, and write films to files."""
 
 import importlib
+import io
 import math
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any, Self
 
@@ -19,6 +21,8 @@ KINDS = (".gif", ".webp", ".mp4")  #: Suffixes of films
 MOST = 150  #: Largest number of pictures of a film by default
 RATE = 15.0  #: Default rate of a film [pictures/s]
 
+_SAMPLED = 6  # pictures from which the colours of a film are chosen
+_EXACT = 64  # the commonest colours, such as white, which a film has exactly
 _TICKS = {".gif": 0.01, ".webp": 0.001}  # resolution of the time for which a picture is shown [s]
 _BT709 = (*("-colorspace", "bt709"), *("-color_primaries", "bt709"), *("-color_trc", "bt709"))
 # Index in front, so that browsers start to play before they have read the whole file.
@@ -137,4 +141,41 @@ def write_film(path: Path, images: Iterable[Image.Image], *, count: int, rate: f
     tick = _TICKS[path.suffix]
     shown = [round(1000 * tick) * ticks for ticks in durations(count, rate, tick)]
     options: dict[str, Any] = {"lossless": True, "method": 2} if path.suffix == ".webp" else {"optimize": False}
-    first.save(path, save_all=True, append_images=frames, duration=shown, loop=0, **options)
+    whole = chain([first], frames)
+    first, *rest = _of_one_palette(whole) if path.suffix == ".gif" else whole
+    first.save(path, save_all=True, append_images=rest, duration=shown, loop=0, **options)
+
+
+def _of_one_palette(images: Iterable[Image.Image]) -> Iterator[Image.Image]:
+    """Yield pictures of a film in the same 256 colours, so that equal parts, such as the colour bar, stay equal.
+
+    Pillow would choose the colours of each picture anew.
+    """
+    kept: list[bytes] = []  # as PNG, since a long film would fill the memory
+    for image in images:
+        content = io.BytesIO()
+        image.convert("RGB").save(content, "PNG", compress_level=1)
+        kept.append(content.getvalue())
+    chosen = sorted({round(k) for k in np.linspace(0, len(kept) - 1, _SAMPLED)})
+    palette = _palette([_opened(kept[k]) for k in chosen])
+    for stored in kept:
+        yield _opened(stored).quantize(palette=palette, dither=Image.Dither.NONE)
+
+
+def _palette(images: Sequence[Image.Image]) -> Image.Image:
+    """Return an image whose palette has the commonest colours of some images, and mixtures of all others."""
+    found: Counter[tuple[int, int, int]] = Counter()
+    for image in images:
+        pairs: Any = image.getcolors(image.width * image.height)
+        found.update({colour: number for number, colour in pairs})
+    ordered = [colour for colour, _ in found.most_common()]
+    exact, others = ordered[:_EXACT], np.array(ordered[_EXACT:], np.uint8).reshape(-1, 1, 3)
+    # Each colour counts once, else the many of the background would leave few for the bodies.
+    mixed = Image.fromarray(others).quantize(256 - _EXACT, kmeans=1).getpalette() if len(others) else []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*np.ravel(exact).tolist(), *(mixed or [])[: 3 * (256 - _EXACT)]])
+    return palette
+
+
+def _opened(content: bytes) -> Image.Image:
+    return Image.open(io.BytesIO(content))
