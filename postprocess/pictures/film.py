@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from PIL import Image
+from scipy.spatial import cKDTree
 
 from dem.errors import InputError
 from postprocess.geometry.links import Floats
@@ -22,6 +23,7 @@ MOST = 150  #: Largest number of pictures of a film by default
 RATE = 15.0  #: Default rate of a film [pictures/s]
 
 _SAMPLED = 6  # pictures from which the colours of a film are chosen
+_DIGITS = np.array([65536, 256, 1])  # to write red, green and blue as one number
 _EXACT = 64  # the commonest colours, such as white, which a film has exactly
 _TICKS = {".gif": 0.01, ".webp": 0.001}  # resolution of the time for which a picture is shown [s]
 _BT709 = (*("-colorspace", "bt709"), *("-color_primaries", "bt709"), *("-color_trc", "bt709"))
@@ -158,23 +160,30 @@ def _of_one_palette(images: Iterable[Image.Image]) -> Iterator[Image.Image]:
         kept.append(content.getvalue())
     chosen = sorted({round(k) for k in np.linspace(0, len(kept) - 1, _SAMPLED)})
     palette = _palette([_opened(kept[k]) for k in chosen])
+    # Pillow would round colours before it looks for the nearest one, which makes white grey.
+    tree = cKDTree(palette)
     for stored in kept:
-        yield _opened(stored).quantize(palette=palette, dither=Image.Dither.NONE)
+        pixels = np.asarray(_opened(stored))
+        colours, places = np.unique(pixels.reshape(-1, 3) @ _DIGITS, return_inverse=True)
+        nearest = tree.query(colours[:, None] // _DIGITS % 256)[1].astype(np.uint8)
+        image = Image.fromarray(nearest[places].reshape(pixels.shape[:2]))
+        image.putpalette(palette.ravel().tolist())
+        yield image
 
 
-def _palette(images: Sequence[Image.Image]) -> Image.Image:
-    """Return an image whose palette has the commonest colours of some images, and mixtures of all others."""
+def _palette(images: Sequence[Image.Image]) -> NDArray[np.uint8]:
+    """Return the commonest colours of some images, and mixtures of all others: 256 or fewer, (n, 3)."""
     found: Counter[tuple[int, int, int]] = Counter()
     for image in images:
         pairs: Any = image.getcolors(image.width * image.height)
         found.update({colour: number for number, colour in pairs})
-    ordered = [colour for colour, _ in found.most_common()]
-    exact, others = ordered[:_EXACT], np.array(ordered[_EXACT:], np.uint8).reshape(-1, 1, 3)
+    ordered = np.array([colour for colour, _ in found.most_common()], np.uint8)
+    exact, others = ordered[:_EXACT], ordered[_EXACT:]
+    if not len(others):
+        return exact
     # Each colour counts once, else the many of the background would leave few for the bodies.
-    mixed = Image.fromarray(others).quantize(256 - _EXACT, kmeans=1).getpalette() if len(others) else []
-    palette = Image.new("P", (1, 1))
-    palette.putpalette([*np.ravel(exact).tolist(), *(mixed or [])[: 3 * (256 - _EXACT)]])
-    return palette
+    mixed = Image.fromarray(others[:, None]).quantize(256 - _EXACT, kmeans=1).getpalette() or []
+    return np.concatenate([exact, np.array(mixed, np.uint8).reshape(-1, 3)[: 256 - _EXACT]])
 
 
 def _opened(content: bytes) -> Image.Image:
