@@ -3,6 +3,7 @@
 `smarticles.commands.calibrate` computes runs as sweeps of scenes.
 """
 
+import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -186,7 +187,8 @@ def measured(run: Run, names: Sequence[str]) -> dict[str, float]:
     table = summarise_run(run, definitions=used, phases={index for _, index in wanted.values()}).set_index("phase")
     found = {}
     for name, (column, index) in wanted.items():
-        if column not in table.columns:
+        row = table.loc[index]
+        if column not in table.columns and row["frames averaged"]:
             raise InputError(f"{run.path}: measure {column!r} is no column; {nearest(column, map(str, table.columns))}")
-        found[name] = float(table.loc[index, column])
+        found[name] = float(row.get(column, math.nan))  # a run of an older version may lack frames of a phase
     return found

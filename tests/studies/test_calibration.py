@@ -9,15 +9,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
+from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError, RunError
+from dem.record.run import Run
 from dem.scene.reading import load_scene
 from smarticles.starters import __file__ as starters
 from studies.calibration import emulator, inference, report
 from studies.calibration.inference import Array, Result, calibrate
 from studies.calibration.measures import columns_of_scene
 from studies.calibration.problem import Datum, Problem, load_problem
-from studies.calibration.simulators import FunctionSimulator, TableSimulator, read_runs
+from studies.calibration.simulators import FunctionSimulator, TableSimulator, measured, read_runs
 
 ASPECTS = (0.4, 0.7, 1.0)
 MEASURES = ("phi_0", "phi_f")
@@ -287,6 +289,18 @@ def test_runs_of_a_table_must_vary_all_parameters_within_their_priors(
     rough = table["wall"].astype(object).where(table.index != 3, "rough")
     with pytest.raises(InputError, match=r"runs.csv, row 5: wall is rough, not a finite number"):
         TableSimulator(problem, table.assign(wall=rough), "runs.csv")
+
+
+def test_a_phase_without_a_frame_has_no_value(tmp_path: Path) -> None:
+    run = Run(write_run(tmp_path / "run", SyntheticRun(frames_per_phase=1)))
+    listed = (run.path / "frames.pvd").read_text(encoding="utf-8").splitlines(keepends=True)
+    (run.path / "frames.pvd").write_text("".join(line for line in listed if "frame_000001" not in line), "utf-8")
+    phi = "phi second-highest-com [-]"
+    assert np.isnan(measured(run, [f"{phi} @ 1"])[f"{phi} @ 1"])
+    found = measured(run, [f"{phi} @ 1", f"{phi} @ 2"])
+    assert [np.isfinite(value) for value in found.values()] == [False, True]
+    with pytest.raises(InputError, match="measure 'ph' is no column"):
+        measured(run, ["ph @ 2"])
 
 
 def test_emulators_of_noise_have_no_sobol_indices(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
