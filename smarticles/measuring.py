@@ -224,7 +224,7 @@ def as_cell(value: Any) -> Any:
 def of_phase(table: pd.DataFrame, phase: str | int) -> pd.DataFrame:
     """Select rows of a table of `measured` by type or number of phase; "last" selects the last phase of each run.
 
-    InputError if no run has such a phase, or none of them has a frame.
+    InputError if no run has such a phase, or none has begun it.
     """
     from dem.record.run import Run  # noqa: PLC0415
 
@@ -232,16 +232,14 @@ def of_phase(table: pd.DataFrame, phase: str | int) -> pd.DataFrame:
         chosen = table["phase"] == phase
         if isinstance(phase, bool) or not chosen.any():
             numbers = ", ".join(str(number) for number in sorted(set(table["phase"])))
-            raise InputError(f"phase: no run has frames of phase {shown(phase)}; known: {numbers}")
+            raise InputError(f"phase: no run has begun phase {shown(phase)}; known: {numbers}")
         return table[chosen].reset_index(drop=True)
     if phase == "last":
         return table[table["phase"] == table.groupby("run")["phase"].transform("max")].reset_index(drop=True)
     if not (table["phase type"] == phase).any():
         measured_types = [*table["phase type"].unique(), "last"]
         if any(one.type == phase for run in table["run"].unique() for one in Run(Path(run)).phases):
-            raise InputError(
-                f"no frame lies in a phase of this type, so that it has no measures; known: {', '.join(measured_types)}"
-            )
+            raise InputError(f"no run has begun a phase of this type; known: {', '.join(measured_types)}")
         raise InputError(f"no run has a phase {phase!r}; {nearest(phase, measured_types)}")
     return table[table["phase type"] == phase].reset_index(drop=True)
 

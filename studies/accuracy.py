@@ -34,7 +34,7 @@ from postprocess.statistics.seeds import Scatter, mean_over_seeds, pooled_scatte
 from studies.framework.figures import POOLED, Analysis, Means, finish, marker, one_by_one, panels
 from studies.framework.findings import Finding, Outcome, Verdict, decide
 from studies.framework.provenance import Reference
-from studies.framework.runs import DEFINITION, ENGINE, Key, Quantity, Row, duration, last_columns
+from studies.framework.runs import DEFINITION, ENGINE, Key, Quantity, Row, duration, last_columns, require_frames
 from studies.framework.study import Study
 from templates.sweep.render import Value, render_yaml
 from templates.sweep.sweep_file import Sweep, SweepFile
@@ -397,9 +397,8 @@ def measure(run: Run, expected_s: Mapping[str, float]) -> Row:
     # The pile is measured at rest if the scene lets it come to rest after its last activity.
     rested = next((phase.index for phase in run.phases[last.index + 1 :] if phase.at_rest), last.index)
     wanted = [active[0].index - 1, rested]
+    require_frames(run, wanted)
     table = summarise_run(run, definitions=[DEFINITION], phases=set(wanted)).set_index("phase")
-    if len(table) != len(wanted):
-        raise InputError(f"{run.path}: no frame of the phase before its activity, or of its last one; run it again")
     before, after = (table.loc[phase] for phase in wanted)
     time, expected = duration(last), expected_s.get(run.path.name, math.nan)
     cpu = math.fsum(_or_nan(phase.cpu_s) for phase in run.phases)

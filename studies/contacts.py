@@ -86,7 +86,7 @@ def lowest_rise(run: Run) -> float:
     frames, heights = run.frames, []
     shaken = next(phase.index for phase in run.phases if phase.type == "shake")
     for phase in (shaken - 1, shaken):
-        part = frames.in_phase(phase)
+        part = run.at_intervals(frames.in_phase(phase))
         late = part.after(part.times[-1] - WINDOW)
         levels = [centres_of_mass(one.vertices)[:, 2] - one.floor_z for one in late]
         count = max(round(len(levels[0]) / 10), 1)

@@ -128,7 +128,7 @@ def measure(run: Run) -> Row:
     }
     for stage, phase in zip(STAGES, (1, 3), strict=True):
         row |= _at_rest(run, frames, stage, phase)
-    late = frames.in_phase(2).after((run.phases[2].end_s or 0.0) - WINDOW - 1e-6)
+    late = run.at_intervals(frames.in_phase(2)).after((run.phases[2].end_s or 0.0) - WINDOW - 1e-6)
     row[MOVING] = float(np.mean([packing_of(frame, run, definition=DEFINITION) for frame in late])) if late else np.nan
     return row | {
         "escaped at the end [-]": escaped(frames[-1], run),

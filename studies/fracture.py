@@ -12,7 +12,6 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from dem.errors import InputError
 from dem.record.run import Run
 from postprocess.geometry.links import centres_of_mass
 from postprocess.measures.pull import (
@@ -59,7 +58,7 @@ from studies.framework.procedures import (
     of_procedure,
     prepared_by,
 )
-from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, Row, declare, last_columns
+from studies.framework.runs import ASPECT_KEY, DEFINITION, THETA_KEY, Key, Row, declare, last_columns, require_frames
 from studies.framework.study import Study
 from studies.strength import (
     ABOVE,
@@ -117,9 +116,8 @@ def measure(run: Run) -> Row:
     """Measure the pile before the pull, and the forces on the hooks; return the run's row."""
     pile, pulled, series = prepared_by(run, PULL), run.phases[-1], run.series
     rest, asked = pulled.index - 1, run.scene["phases"][pulled.index]
+    require_frames(run, [rest])
     table = summarise_run(run, definitions=[DEFINITION], phases={rest, pulled.index}).set_index("phase")
-    if rest not in table.index:
-        raise InputError(f"{run.path}: no frame of the rest before the pull; run it again")
     before = table.loc[rest]
     frame = run.frames.in_phase(rest)[-1]
     hook = float(series["hook_upper_z_m"][series.nearest(frame.time)])

@@ -21,7 +21,7 @@ START_S = 2.5
 SHORT_STEP = 1e-6  # s; filaments and chains that need shorter steps are warned about
 _LEFT_OUT = {
     "series_interval_s": "one sample is taken, at the start",
-    "frame_interval_s": "no frame is written",
+    "frame_interval_s": "each phase has one frame, at its end",
     "sphere_interval_s": "no spheres are written",
 }
 
@@ -53,7 +53,6 @@ class Plan:
     effects: tuple[Decision, ...]
     engines: tuple[str, ...]
     frames: int
-    frame_interval_s: float
     measuring: MeasuringCost
     wall_s: float  #: Expected wall time of all phases, without `start_s` and `compile_s`
     warnings: tuple[str, ...]
@@ -121,18 +120,8 @@ class Plan:
         """Return lines about the frames, and about the memory and time that measures take."""
         cost = self.measuring
         size, whole = (_size(number) for number in (cost.frame_bytes, self.frames * cost.frame_bytes))
-        short = [
-            f"{phase.index} {phase.type}"
-            for phase in self.phases
-            if phase.duration_s is not None and 2 * phase.time_step_s < phase.duration_s < self.frame_interval_s
-        ]
         return [
             f"frames: about {self.frames} of {size}, {whole} together",
-            *(
-                f"phase {name}: shorter than recording.frame_interval_s = {self.frame_interval_s:g} s, so that it may "
-                "have no frame and no measures"
-                for name in short
-            ),
             f"smarticles measure: about {_size(cost.memory_bytes)} of memory in each process, "
             f"{_wall_time(cost.cpu_s)} of processor time for each run",
         ]
@@ -219,8 +208,8 @@ def plan(scene: Scene) -> Plan:
         phases=phases,
         effects=effects,
         engines=tuple(sorted(engines, key=kind.order.index)),
-        frames=round(sum(phase.estimate_s for phase in phases) / scene.recording.frame_interval_s),
-        frame_interval_s=scene.recording.frame_interval_s,
+        # Each phase ends with a frame.
+        frames=len(phases) + round(sum(phase.estimate_s for phase in phases) / scene.recording.frame_interval_s),
         measuring=_measuring_cost(scene),
         wall_s=sum(phase.wall_s for phase in phases),
         warnings=warnings_of(scene),

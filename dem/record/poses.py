@@ -134,6 +134,8 @@ def _read_vtu(path: Path, unit: str | None) -> tuple[PosedBody, ...]:
         _reject(path, "a point is not finite")
     if recorded:
         segments[..., 2] -= data["floor_z_m"][:, None]
+    if len(times := np.unique(data.get("time_s", 0.0))) > 1:
+        _reject(path, f"it holds {len(times)} times by its cell data time_s; keep one")
     numbers = _whole(path, name, data[name])
     kinds = _whole(path, "kind", data["kind"]) if "kind" in data else None
     found = []

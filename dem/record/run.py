@@ -134,6 +134,24 @@ class Run(Shown):
         """The recorded frames in time order, each read when it is asked for."""
         return read_frames(self.path)
 
+    def at_intervals(self, part: FrameSequence) -> FrameSequence:
+        """Return a phase's frames at `recording.frame_interval_s`, for means over time.
+
+        The frame at the end of the phase is left out if it follows at another interval, unless it is the only one.
+        """
+        if len(part) < 2:
+            return part
+        try:
+            recording = self.scene["recording"]
+            sample, interval = (float(recording[f"{name}_interval_s"]) for name in ("series", "frame"))
+        except InputError:  # frames can be measured without the scene file
+            return part
+        interval, last = sample * max(1, round(interval / sample)), float(part.times[-1])
+        step = self.manifest.phases[part[-1].phase].time_step_s or self.manifest.time_step_s
+        # A frame at an interval is on the step nearest to its time; times in the list are rounded to nine digits.
+        near = abs(last - interval * round(last / interval)) <= 0.5001 * step + 1e-8 * last
+        return part if near else part[:-1]
+
     @property
     def has_frames(self) -> bool:
         """Whether the run has written a frame."""

@@ -35,7 +35,7 @@ class Recorder:
     points: Callable[[PileState], Array]  #: Returns (N, P, 3) points of a state that must stay inside the container [m]
     progress: ProgressWriter
     interval: float  #: Time between samples [s]
-    frame_every: int  #: Samples between frames
+    frame_every: int  #: Samples between frames; a further frame is at the end of each phase
     watch_every: int | None = None  #: Samples between checks of the watchdog; None: about `WATCH_STEPS` steps
     forces: FrameWriter | None = None  #: Writes the forces at contacts, with each frame
     spheres: FrameWriter | None = None  #: Writes the spheres
@@ -51,11 +51,7 @@ class Recorder:
         row = self.sampler.sample(engine, state, phase)
         self.series.add(row)
         if engine.count and self.samples % self.frame_every == 0:
-            self.frames.write(_mesh(engine, state, phase), engine.time)
-            if self.forces is not None:
-                found = engine.contact_forces()
-                self.forces.write(force_mesh(found, state.positions, time=engine.time, phase=phase), engine.time)
-            self.series.keep_up()
+            self._write_frame(engine, state, phase)
         if self.spheres is not None and engine.count and self.samples % self.sphere_every == 0:
             self.spheres.write(sphere_mesh(state, engine.particle), engine.time)
         # After the frame is written: the last frame of a run that fails is worth having.
@@ -68,6 +64,18 @@ class Recorder:
         self.progress.update(time=engine.time, phi=row["packing_fraction"], count=engine.count)
         self.samples += 1
         self.schedule(engine)
+
+    def end_phase(self, engine: Engine, phase: int) -> None:
+        """Write the frame at the end of a phase, unless the present instant has one."""
+        if engine.count and self.frames.times[-1:] != [engine.time]:
+            self._write_frame(engine, engine.state(), phase)
+
+    def _write_frame(self, engine: Engine, state: PileState, phase: int) -> None:
+        self.frames.write(_mesh(engine, state, phase), engine.time)
+        if self.forces is not None:
+            found = engine.contact_forces()
+            self.forces.write(force_mesh(found, state.positions, time=engine.time, phase=phase), engine.time)
+        self.series.keep_up()
 
     def schedule(self, engine: Engine) -> None:
         """Set `next_step` to the step nearest to the next sample's time; called after each change of dt."""

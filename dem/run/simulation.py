@@ -94,6 +94,7 @@ class Simulation:
         while wait := self._stage.proceed(self.engine):
             self._target = self.engine.steps + max(1, round(wait / self.engine.time_step))
             self._advance()
+        self.recorder.end_phase(self.engine, self._phase)
         entry["end_s"] = self.engine.time
         entry["wall_s"] += self.wall
         entry["cpu_s"] += self.cpu

@@ -12,7 +12,8 @@ class Recording(Part):
 
     frame_interval_s: Duration = Field(
         0.04,
-        description="time between VTK frames [s]; not a multiple of the shaking period, to sample all its phases",
+        description="time between VTK frames [s], besides the one at the end of each phase; not a multiple of the "
+        "shaking period, to sample all its phases",
     )
     frames: Literal["vtu", "vtkhdf"] = Field(
         "vtu",

@@ -20,6 +20,10 @@ from postprocess.geometry.segments import checked_segments
 
 BODY_FIELDS = ("body", "smarticle_id")  #: Data with body numbers in VTK files; the first one found is used
 
+#: Columns and data that number times; a file with several values of one has the same bodies several times
+TIMES = ("frame", "time", "time_s", "t", "step", "timestep", "snapshot", "timevalue")
+ORDER = "index"  #: Column with the order of the points of a body
+
 # Numbers of VTK's cells: lines and polylines; quadratic, cubic and Lagrange curves; cells without lines.
 _LINES, _CURVED, _POINTS = (3, 4), (21, 35, 68), (0, 1, 2)
 _READERS = {".vtu": "vtkXMLUnstructuredGridReader", ".vtp": "vtkXMLPolyDataReader", ".vtk": "vtkDataSetReader"}
@@ -39,13 +43,14 @@ def read_centrelines(path: Path | str, *, unit: str | None = None) -> Centreline
     """Read the centre lines of bodies from a file.
 
     - `.csv`: columns `body` (whole numbers), `x`, `y`, `z`, and `kind` if bodies are of several kinds. Each row is a
-      point; rows of one body, in their order, are joined by segments. A closed body repeats its first point at the end.
-      The unit may be in the header, `x [mm]`.
+      point; rows of one body, in their order or in that of a column `index`, are joined by segments. A closed body
+      repeats its first point at the end. The unit may be in the header, `x [mm]`.
     - `.vtu`, `.vtp`, `.vtk`: lines, polylines and curved edges, which become segments between their points. Cell data
       or point data `body` or `smarticle_id` number the bodies, so that frames of a run can be read. Without these,
       lines that share points are one body. These files need PyVista, the extra `viz`.
 
-    Points that follow each other and coincide are one point. Numbers of bodies are whole numbers, 0 or more.
+    Points that follow each other and coincide are one point. Numbers of bodies are whole numbers, 0 or more. The file
+    has the bodies at one time: a column or data of `TIMES` has one value.
 
     Args:
         path: The file.
@@ -53,7 +58,7 @@ def read_centrelines(path: Path | str, *, unit: str | None = None) -> Centreline
             unit, so that it must be given.
 
     Raises:
-        InputError: The file is missing, damaged or without segments, or its unit is unknown.
+        InputError: The file is missing, damaged, without segments or of several times, or its unit is unknown.
     """
     if not isinstance(path, str | os.PathLike):
         raise InputError(f"centre lines: {shown(path)} is no file; give its path; of a frame, use segments_of(frame)")
@@ -108,8 +113,10 @@ def _read_csv(path: Path, unit: str | None) -> tuple[Floats, Whole, Whole, NDArr
     wrong = np.nonzero(~np.isfinite(points).all(axis=1))[0]
     if len(wrong):
         _reject(path, f"line {wrong[0] + 2} needs three finite coordinates")
+    for name in table.columns:
+        _reject_times(path, f"column {name}", name, table[name].to_numpy())
     body = _whole(path, table["body"].to_numpy(), "line", np.arange(len(table)) + 2)
-    order = np.argsort(body, kind="stable")
+    order = np.lexsort((_places(path, table, body), body))
     joined = body[order][1:] == body[order][:-1]
     lines = np.stack([order[:-1], order[1:]], axis=1)[joined]
     single = np.setdiff1d(body, body[lines.ravel()])
@@ -121,6 +128,29 @@ def _read_csv(path: Path, unit: str | None) -> tuple[Floats, Whole, Whole, NDArr
             _reject(path, f"line {absent[0] + 2} has no kind")
         kind = table["kind"].to_numpy()[lines[:, 0]]
     return points, lines, body[lines[:, 0]], kind, unit or next(iter(stated), None)
+
+
+def _places(path: Path, table: pd.DataFrame, body: Whole) -> Whole | Floats:
+    """Return the places (n,) of points in their bodies (n,): of the column `index`, or the order of the rows."""
+    if ORDER not in table.columns:
+        return np.arange(len(table))
+    places: Floats = pd.to_numeric(table[ORDER], errors="coerce").to_numpy(np.float64)
+    if len(wrong := np.nonzero(~np.isfinite(places))[0]):
+        _reject(path, f"line {wrong[0] + 2}: {ORDER} is {table[ORDER].iloc[wrong[0]]}, no number")
+    if len(again := np.nonzero(pd.DataFrame({"body": body, ORDER: places}).duplicated())[0]):
+        _reject(
+            path,
+            f"line {again[0] + 2}: body {body[again[0]]} has {ORDER} {places[again[0]]:g} twice",
+            "number the points of each body in their order, and keep one time per file",
+        )
+    return places
+
+
+def _reject_times(path: Path, where: str, name: str, values: NDArray[Any]) -> None:
+    """Raise InputError if values (n,) whose name means a time are several."""
+    if name.lower() in TIMES and (number := len(pd.unique(values))) > 1:
+        remedy = "keep one time per file, or rename what is no time"
+        _reject(path, f"{where} has {number} values: it holds the bodies at several times", remedy)
 
 
 def _read_vtk(path: Path, suffix: str) -> _Lines:
@@ -145,6 +175,9 @@ def _read_vtk(path: Path, suffix: str) -> _Lines:
     lines, cell = np.stack([corners[joined], corners[joined + 1]], axis=1), cells[joined]
     if len(single := np.setdiff1d(np.nonzero(line)[0], cell)):
         _reject(path, f"cell {single[0]} is a line of one point")
+    for what, data in (("cell", mesh.cell_data), ("point", mesh.point_data)):
+        for name in data:
+            _reject_times(path, f"{what} data {name}", name, np.asarray(data[name]).ravel())
     kind = mesh.cell_data["kind"][cell] if "kind" in mesh.cell_data else None
     return np.asarray(mesh.points, dtype=np.float64), lines, _bodies(path, mesh, lines, cell), kind
 

@@ -144,7 +144,7 @@ def _of_series(run: Run, definition: str, shaken: Vibration) -> tuple[Floats, Fl
 def _core(run: Run, shaken: Vibration) -> tuple[Floats, Floats]:
     frames, last = run.frames, shaken.phase.index
     times, heights = [], []
-    for frame in (frame for phase in (last - 1, last) for frame in frames.in_phase(phase)):
+    for frame in (frame for phase in (last - 1, last) for frame in run.at_intervals(frames.in_phase(phase))):
         centres = body_centres(frame)
         within = np.hypot(centres[:, 0], centres[:, 1]) <= run.manifest.container_radius_m
         times.append(frame.time)

@@ -36,8 +36,8 @@ def mean_squared_displacement(
     window).
 
     Args:
-        positions: Frames at equal intervals, such as `run.frames.in_phase(1)`; or positions (T, N, 3) [m] of N bodies
-            at T times, NaN where a body is missing.
+        positions: Frames at equal intervals, such as `run.at_intervals(run.frames.in_phase(1))`; or positions
+            (T, N, 3) [m] of N bodies at T times, NaN where a body is missing.
         times: (T,) times of the positions [s]; left out for frames, which have them.
         without_drift: Whether to subtract the mean motion of all bodies.
 
@@ -51,7 +51,7 @@ def mean_squared_displacement(
     """
     if isinstance(positions, FrameSequence):
         times, positions = positions.times if times is None else times, centres_of_mass(positions)
-    places = floats("positions", positions, "give frames of a run, such as run.frames.in_phase(1)[:-1]")
+    places = floats("positions", positions, "give frames of a run, such as run.at_intervals(run.frames.in_phase(1))")
     when = np.asarray(times, dtype=np.float64)
     if places.ndim != 3 or places.shape[2] != 3 or len(places) < 2:
         raise InputError(f"positions must be (T, N, 3) [m] at 2 times or more: got {places.shape}; give a run's frames")
@@ -64,7 +64,7 @@ def mean_squared_displacement(
         number = int(np.argmax(uneven)) if uneven.any() else 0
         raise InputError(
             f"frame {number + 1} is {steps[number]:g} s after the one before, others {interval:g} s: give frames at "
-            "equal intervals, such as those of one phase without its last one, run.frames.in_phase(1)[:-1]"
+            "equal intervals, such as those of one phase, run.at_intervals(run.frames.in_phase(1))"
         )
     along, count = np.full((len(places), 3), np.nan), np.zeros(len(places), np.int64)
     for lag in range(len(places)):

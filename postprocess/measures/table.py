@@ -23,6 +23,7 @@ Costly = Literal["never", "phase-end", "every-frame"]  #: Frames for which costl
 
 LAST_FRAMES = 20  #: Number of frames averaged at the end of a phase, as in Savoie et al
 
+_PHASE = ("phase", "phase type")
 _LABELS = ("run", "name", SEED, ASPECT, "count", "fidelity", "scene_sha256")
 # Left out, because the table computes these from the frames.
 _SERIES_MEASURED = frozenset({"time_s", "phase", "count", "com_height_m", "packing_fraction"})
@@ -47,15 +48,15 @@ def measure_run(
 
     Returns:
         A table with one row per frame and units in its column names. Columns of `series.h5`, if that file exists, have
-        the sample nearest in time. A value is NaN if it is undefined for its frame, such as the packing fraction of one
-        smarticle, or if it is costly and not computed.
+        the sample of the frame's phase that is nearest in time. A value is NaN if it is undefined for its frame, such
+        as the packing fraction of one smarticle, or if it is costly and not computed.
 
     Raises:
         InputError: Unknown definition or name, or a file is missing or damaged.
     """
     frames, series = _open(run, definitions)
     rows: list[dict[str, object]] = []
-    for part in _frames_by_phase(run, frames):
+    for part in filter(None, _frames_by_phase(run, frames)):
         known = (*frame_measures(definitions, also), *measures)
         rows += _rows(part, run, series, known, costly, asked=also, offset=len(rows))
     return pd.DataFrame(rows)
@@ -74,7 +75,7 @@ def summarise_run(
     """Measure each phase of a run: means over its last frames, and measures of the whole phase.
 
     Args:
-        last: Number of frames to average; a phase with fewer frames is averaged over all its frames.
+        last: Number of frames to average, at equal intervals of time; a phase with fewer is averaged over all of them.
         definitions: Definitions of the packing fraction, keys of `packing.DEFINITIONS`.
         costly: Frames for which costly measures are computed, see `measure_run`.
         also: Names of measures that tables have on request alone, such as "crossing-number".
@@ -82,10 +83,11 @@ def summarise_run(
         measures: Further measures, whose columns follow those of the registered ones.
 
     Returns:
-        A table with one row per phase and units in its column names. A column "… SE" follows each mean with its
-        standard error, see `seeds.mean_with_error`. "frames averaged" is the number of frames. Of a pour, only frames
-        of the settled pile are averaged; if there is none, the number is 0 and all means are NaN. By default costly
-        measures are computed for the last frame alone and have no error.
+        A table with one row per phase that the run has begun and units in its column names. A column "… SE" follows
+        each mean with its standard error, see `seeds.mean_with_error`. "frames averaged" is the number of frames. The
+        frame at the end of a phase counts in means where no other frame has a value, since it may follow at another
+        interval. Of a pour, only frames of the settled pile are averaged. If there is no frame to average, the number
+        is 0 and all means are NaN. By default costly measures are computed for the last frame alone and have no error.
 
     Raises:
         InputError: Unknown definition or name, `last` below 1, or a file is missing or damaged.
@@ -93,23 +95,46 @@ def summarise_run(
     if last < 1:
         raise InputError(f"last must be 1 frame or more: got {last}; {LAST_FRAMES} is usual")
     frames, series = _open(run, definitions)
+    known = (*frame_measures(definitions, also), *measures)
     summaries = []
-    for part in _frames_by_phase(run, frames):
-        if phases is not None and part[0].phase not in phases:
+    for index, part in enumerate(_frames_by_phase(run, frames)):
+        if (phases is not None and index not in phases) or not (part or _begun(run, series, index)):
             continue
-        known = (*frame_measures(definitions, also), *measures)
-        chosen = _averaged(part[-last:], run)
-        table = pd.DataFrame(_rows(chosen or part[-1:], run, series, known, costly if chosen else "never"))
-        summary = {name: table[name].iloc[-1] for name in (*_LABELS, "phase", "phase type", "time [s]")}
-        summary["frames averaged"] = len(chosen)
-        for name in table.columns.difference([*summary, "frame"], sort=False):
-            mean = mean_with_error(table[name] if chosen else [])
-            summary |= {name: mean.value, marked(name, "SE"): mean.standard_error}
+        summary: dict[str, object] = {**_labels(run, index), "time [s]": run.phases[index].end_s, "frames averaged": 0}
+        if part:
+            summary |= _means(part, run, series, known, last=last, costly=costly)
         if series is not None:
             for measure in phase_measures():
-                summary |= measure.columns(run, series, part[0].phase)
+                summary |= measure.columns(run, series, index)
         summaries.append(summary)
     return pd.DataFrame(summaries)
+
+
+def _means(
+    part: FrameSequence,
+    run: Run,
+    series: Series | None,
+    known: Sequence[FrameMeasure],
+    *,
+    last: int,
+    costly: Costly,
+) -> dict[str, object]:
+    """Return means over the last frames of a phase, with errors, and values of its last frame by column."""
+    end = part[-1]
+    chosen = _averaged(run.at_intervals(part)[-last:], run) or _averaged([end], run)
+    shown = [*(frame for frame in chosen if frame.number != end.number), end]
+    table = pd.DataFrame(_rows(shown, run, series, known, costly if chosen else "never"))
+    found: dict[str, object] = {"time [s]": end.time, "frames averaged": len(chosen)}
+    for name in table.columns.difference([*_LABELS, *_PHASE, *found, "frame"], sort=False):
+        values = table[name].iloc[: len(chosen)]
+        mean = mean_with_error(values if values.notna().any() or not chosen else table[name])
+        found |= {name: mean.value, marked(name, "SE"): mean.standard_error}
+    return found
+
+
+def _begun(run: Run, series: Series | None, phase: int) -> bool:
+    """Return whether a run has begun a phase, of which it has no frame."""
+    return run.phases[phase].end_s is not None or (series is not None and bool((series["phase"] >= phase).any()))
 
 
 def columns_of(run: Run, phase: int, recorded: Iterable[str]) -> list[str]:
@@ -149,21 +174,26 @@ def _open(run: Run, definitions: Iterable[str]) -> tuple[FrameSequence, Series |
 
 
 def _frames_by_phase(run: Run, frames: FrameSequence) -> list[FrameSequence]:
-    """Return the frames of each phase, without phases that have none."""
+    """Return the frames of each phase; none for a phase that takes no time, or that older versions recorded."""
     parts = [frames.in_phase(phase.index) for phase in run.phases]
     if sum(map(len, parts)) != len(frames):
         raise InputError(
             f"frames of {run.path} name phases that run.json does not have "
             f"(it has {len(parts)}), or not in order; run it again into a new directory"
         )
-    return [part for part in parts if part]
+    return parts
 
 
-def _averaged(part: FrameSequence, run: Run) -> Sequence[Frame]:
+def _averaged(part: Sequence[Frame], run: Run) -> list[Frame]:
     """Return the frames at the end of a phase that its means average: of a pour, those of the settled pile."""
-    if run.phases[part[0].phase].type != POUR:
-        return part
-    return [frame for frame in part if settled(frame, run)]
+    return [frame for frame in part if run.phases[frame.phase].type != POUR or settled(frame, run)]
+
+
+def _labels(run: Run, phase: int) -> dict[str, object]:
+    """Return the columns that identify a run and its phase."""
+    made = run.manifest
+    values = (str(run.path), made.name, made.seed, made.aspect_ratio, made.count, made.fidelity, made.scene_sha256)
+    return dict(zip((*_LABELS, *_PHASE), (*values, phase, run.phases[phase].type), strict=True))
 
 
 def _rows(
@@ -184,18 +214,11 @@ def _rows(
     """
     rows: list[dict[str, object]] = []
     measures = [measure for measure in known if measure.available_for(run)]
-    made = run.manifest
-    values = (str(run.path), made.name, made.seed, made.aspect_ratio, made.count, made.fidelity, made.scene_sha256)
-    labels = dict(zip(_LABELS, values, strict=True))
     for number, frame in enumerate(part):
         take_costly = costly == "every-frame" or (costly == "phase-end" and number == len(part) - 1)
-        row: dict[str, object] = {
-            **labels,
-            "frame": offset + number,
-            "time [s]": frame.time,
-            "phase": frame.phase,
-            "phase type": run.phases[frame.phase].type,
-        }
+        labels = _labels(run, frame.phase)
+        of_phase = {name: labels.pop(name) for name in _PHASE}
+        row: dict[str, object] = {**labels, "frame": offset + number, "time [s]": frame.time, **of_phase}
         for measure in measures:
             taken = take_costly or not measure.costly or measure.name in asked
             columns = measure.columns(frame if taken else None, run)
@@ -203,14 +226,18 @@ def _rows(
                 raise InputError(f"measure {measure.name}: the table has a column {min(twice)!r} already; rename it")
             row |= columns
         if series is not None:
-            row |= _series_columns(series, frame.time)
+            row |= _series_columns(series, frame)
         rows.append(row)
     return rows
 
 
-def _series_columns(series: Series, time: float) -> dict[str, float]:
+def _series_columns(series: Series, frame: Frame) -> dict[str, float]:
+    """Return the values of the series in the sample nearest in time with the phase and the bodies of a frame."""
     columns: dict[str, float] = {}
-    index = series.nearest(time)
+    alike = np.flatnonzero((series["phase"] == frame.phase) & (series.get("count", frame.count) == frame.count))
+    if not len(alike):
+        return columns
+    index = alike[np.abs(series.time[alike] - frame.time).argmin()]
     for name, values in series.data.items():
         if name in _SERIES_MEASURED:
             continue

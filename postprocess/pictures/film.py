@@ -1,16 +1,19 @@
 """Choose the frames and the speed of films, and write films to files."""
 
 import importlib
+import io
 import math
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from PIL import Image
+from scipy.spatial import cKDTree
 
 from dem.errors import InputError
 from postprocess.geometry.links import Floats
@@ -19,6 +22,9 @@ KINDS = (".gif", ".webp", ".mp4")  #: Suffixes of films
 MOST = 150  #: Largest number of pictures of a film by default
 RATE = 15.0  #: Default rate of a film [pictures/s]
 
+_SAMPLED = 6  # pictures from which the colours of a film are chosen
+_DIGITS = np.array([65536, 256, 1])  # to write red, green and blue as one number
+_EXACT = 64  # the commonest colours, such as white, which a film has exactly
 _TICKS = {".gif": 0.01, ".webp": 0.001}  # resolution of the time for which a picture is shown [s]
 _BT709 = (*("-colorspace", "bt709"), *("-color_primaries", "bt709"), *("-color_trc", "bt709"))
 # Index in front, so that browsers start to play before they have read the whole file.
@@ -137,4 +143,48 @@ def write_film(path: Path, images: Iterable[Image.Image], *, count: int, rate: f
     tick = _TICKS[path.suffix]
     shown = [round(1000 * tick) * ticks for ticks in durations(count, rate, tick)]
     options: dict[str, Any] = {"lossless": True, "method": 2} if path.suffix == ".webp" else {"optimize": False}
-    first.save(path, save_all=True, append_images=frames, duration=shown, loop=0, **options)
+    whole = chain([first], frames)
+    first, *rest = _of_one_palette(whole) if path.suffix == ".gif" else whole
+    first.save(path, save_all=True, append_images=rest, duration=shown, loop=0, **options)
+
+
+def _of_one_palette(images: Iterable[Image.Image]) -> Iterator[Image.Image]:
+    """Yield pictures of a film in the same 256 colours, so that equal parts, such as the colour bar, stay equal.
+
+    Pillow would choose the colours of each picture anew.
+    """
+    kept: list[bytes] = []  # as PNG, since a long film would fill the memory
+    for image in images:
+        content = io.BytesIO()
+        image.convert("RGB").save(content, "PNG", compress_level=1)
+        kept.append(content.getvalue())
+    chosen = sorted({round(k) for k in np.linspace(0, len(kept) - 1, _SAMPLED)})
+    palette = _palette([_opened(kept[k]) for k in chosen])
+    # Pillow would round colours before it looks for the nearest one, which makes white grey.
+    tree = cKDTree(palette)
+    for stored in kept:
+        pixels = np.asarray(_opened(stored))
+        colours, places = np.unique(pixels.reshape(-1, 3) @ _DIGITS, return_inverse=True)
+        nearest = tree.query(colours[:, None] // _DIGITS % 256)[1].astype(np.uint8)
+        image = Image.fromarray(nearest[places].reshape(pixels.shape[:2]))
+        image.putpalette(palette.ravel().tolist())
+        yield image
+
+
+def _palette(images: Sequence[Image.Image]) -> NDArray[np.uint8]:
+    """Return the commonest colours of some images, and mixtures of all others: 256 or fewer, (n, 3)."""
+    found: Counter[tuple[int, int, int]] = Counter()
+    for image in images:
+        pairs: Any = image.getcolors(image.width * image.height)
+        found.update({colour: number for number, colour in pairs})
+    ordered = np.array([colour for colour, _ in found.most_common()], np.uint8)
+    exact, others = ordered[:_EXACT], ordered[_EXACT:]
+    if not len(others):
+        return exact
+    # Each colour counts once, else the many of the background would leave few for the bodies.
+    mixed = Image.fromarray(others[:, None]).quantize(256 - _EXACT, kmeans=1).getpalette() or []
+    return np.concatenate([exact, np.array(mixed, np.uint8).reshape(-1, 3)[: 256 - _EXACT]])
+
+
+def _opened(content: bytes) -> Image.Image:
+    return Image.open(io.BytesIO(content))

@@ -215,11 +215,13 @@ def _notes(table: pd.DataFrame) -> list[str]:
     There is a line for each pour without a frame of the settled pile, and for each hook that touched nothing, or that
     was stopped at its force limit.
     """
+    from postprocess.measures.pile import POUR  # noqa: PLC0415
+
     notes = []
     for row in table.to_dict("records"):
         where = f"{row['run']}: phase {row['phase']} ({row['phase type']})"
-        if row.get("frames averaged") == 0:
-            remedy = "lower recording.frame_interval_s" if row[STATE] == DONE else "wait for the run, or resume it"
+        if row.get("frames averaged") == 0 and row["phase type"] == POUR:
+            remedy = "run it anew" if row[STATE] == DONE else "wait for the run, or resume it"
             notes.append(f"{where}: no frame has the settled pile, so that there are no means of the pour; {remedy}")
         if "hook work [J]" not in table.columns:
             continue
@@ -237,23 +239,20 @@ def _notes(table: pd.DataFrame) -> list[str]:
 
 
 def _without_frames(table: pd.DataFrame) -> list[str]:
-    """Return a note for each phase of finished runs that has samples but no frame, and thus no row in the table."""
+    """Return a note for each phase of finished runs that took time and has no frame; older versions wrote none."""
     from dem.record.run import Run  # noqa: PLC0415
 
     found: dict[tuple[int, str], list[Path]] = {}
-    for name, rows in table[table[STATE] == DONE].groupby("run", sort=False):
-        run, seen = Run(Path(str(name))), set(rows["phase"])
-        missing = [phase for phase in run.manifest.phases if phase.index not in seen]
-        if not missing or run.lost_series:
-            continue
-        sampled = run.series["phase"]
-        for phase in missing:
-            # A phase of one time step, such as place, has one sample at most.
-            if (sampled == phase.index).sum() > 1:
+    for name in table["run"][table[STATE] == DONE].unique():
+        run = Run(Path(str(name)))
+        for phase in run.phases:
+            lasted = (phase.end_s or 0.0) - (phase.start_s or 0.0)
+            # A phase of one time step, such as place, hardly changes the pile.
+            if lasted > 2 * run.manifest.time_step_s and not run.frames.in_phase(phase.index):
                 found.setdefault((phase.index, phase.type), []).append(run.path)
     return [
-        f"{runs[0]}{f' and {len(runs) - 1} more' if runs[1:] else ''}: phase {index} ({kind}) ended before a frame was "
-        "due, and has no row; lower recording.frame_interval_s"
+        f"{runs[0]}{f' and {len(runs) - 1} more' if runs[1:] else ''}: phase {index} ({kind}) has no frame, and so "
+        "no means; run it anew, since each phase now ends with a frame"
         for (index, kind), runs in sorted(found.items())
     ]
 

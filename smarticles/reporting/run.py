@@ -169,9 +169,8 @@ def picture_blocks(
                 views.append(data_url(content.getvalue(), "image/webp"))
         except (InputError, RunError) as error:
             return [words(f"No picture: {error}", tone="note")]
-    moment = run.phases[-1].type if run.status.state == "done" else "its last frame"
     manifest = run.manifest
-    shows = f"The {_bodies(manifest)} of {manifest.name} at the end of {moment}, drawn as {drawn_as(manifest.kinds)}"
+    shows = f"The {_bodies(manifest)} of {manifest.name} {_moment(run)}, drawn as {drawn_as(manifest.kinds)}"
     caption = f"Run {name}" if name else f"{shows}. For other views or times use smarticles render."
     blocks = [figure(caption, shows, still, "card")]
     if views:
@@ -179,6 +178,16 @@ def picture_blocks(
         how = "Move the pointer across the picture, tap, or use the arrow keys to turn it."
         blocks.append(turntable(f"{f'Run {name} from all sides' if name else around}. {how}", around, views))
     return blocks
+
+
+def _moment(run: Run) -> str:
+    """Return in words when the last frame of a run was recorded."""
+    frame = run.frames[-1]
+    phase = run.phases[frame.phase]
+    # Times of phases are exact, those in lists of frames have nine digits.
+    if phase.end_s is not None and frame.time >= phase.end_s * (1 - 1e-8):
+        return f"at the end of {phase.type}"
+    return f"at {frame.time:.4g} s, in {phase.type}"
 
 
 def _bodies(manifest: Manifest) -> str:

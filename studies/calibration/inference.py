@@ -116,7 +116,11 @@ class Result:
         return pd.DataFrame(rows)
 
     def sensitivity(self) -> pd.DataFrame:
-        """Tabulate Sobol indices of each emulator's mean for parameters drawn from their priors (SALib)."""
+        """Tabulate Sobol indices of each emulator's mean for parameters drawn from their priors (SALib).
+
+        They are shares of the variance that the emulator explains, whose share of the runs' variance is `explained`.
+        Emulators that explain no more than noise might, `Emulator.resolved`, have no indices.
+        """
         from SALib.analyze import sobol as analysis  # noqa: PLC0415  (an extra)
         from SALib.sample import sobol as sampling  # noqa: PLC0415
 
@@ -128,14 +132,15 @@ class Result:
         inputs = self.problem.scaled(self.problem.from_unit(unit))
         rows = []
         for datum, emulator in zip(self.problem.data, self.emulators, strict=True):
-            if emulator is None:
+            if emulator is None or not emulator.resolved:
                 continue
             mean, _ = emulator.predict(inputs)
             found = analysis.analyze(space, mean, calc_second_order=False, seed=self.problem.content.first_seed)
             for k, name in enumerate(names):
                 row = {**self.problem.conditions[datum.condition], "measure": datum.measure, "parameter": name}
                 row |= {"first order": found["S1"][k], "first order 95 %": found["S1_conf"][k]}
-                rows.append(row | {"total": found["ST"][k], "total 95 %": found["ST_conf"][k]})
+                row |= {"total": found["ST"][k], "total 95 %": found["ST_conf"][k]}
+                rows.append(row | {"explained, left out one by one": emulator.explained})
         return pd.DataFrame(rows)
 
 
@@ -192,11 +197,16 @@ def calibrate(
     if diagnostics["steps over autocorrelation time"] < ENOUGH_TIMES:
         warnings.append(f"the chain has not converged: fewer than {ENOUGH_TIMES} autocorrelation times")
     for datum, emulator in zip(problem.data, emulators, strict=True):
-        if emulator is not None and np.mean(np.abs(emulator.loo) < 2) < 0.8:  # 95 % are expected
-            warnings.append(f"the emulator of {datum.label(problem.conditions)} predicts left-out runs badly")
-        elif emulator is not None and emulator.explained < 0:
+        if emulator is None:
+            continue
+        label = datum.label(problem.conditions)
+        if np.mean(np.abs(emulator.loo) < 2) < 0.8:  # 95 % are expected
+            warnings.append(f"the emulator of {label} predicts left-out runs badly")
+        if not emulator.resolved:
+            explained, noise = (f"{100 * max(0.0, one):.0f} %" for one in (emulator.explained, emulator.noise_explains))
             warnings.append(
-                f"no effect of any parameter on {datum.label(problem.conditions)} is seen beyond the scatter"
+                f"no effect of any parameter on {label} is seen beyond the scatter: its emulator explains "
+                f"{explained} of the variance of the runs, noise alone might {noise}; it has no Sobol indices"
             )
     return Result(
         problem=problem,

@@ -27,13 +27,19 @@ def check_measures(problem: Problem) -> None:
     for datum in problem.data:
         scene, where = scenes[datum.condition], f"{problem.path.parent / problem.content.data}"
         column, phase = column_and_phase(datum.measure, [one.kind for one in scene.phases], where)
+        kind = scene.phases[phase].kind
+        if phase and scene.phases[phase].known_duration == 0:
+            raise InputError(
+                f"{where}: measure {datum.measure!r}: phase {phase}, {kind}, takes no time and has no frame; give the "
+                f"phase before, @ {phase - 1}"
+            )
         key = datum.condition, phase
         if key not in known:
             known[key] = columns_of_scene(scene, phase)
         if column not in known[key]:
             raise InputError(
                 f"{where}: measure {datum.measure!r}: runs will have no column {column!r} in phase {phase}, "
-                f"{scene.phases[phase].kind}; {nearest(column, known[key])}"
+                f"{kind}; {nearest(column, known[key])}"
             )
 
 

@@ -4,12 +4,13 @@
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from dem.errors import InputError, RunError, nearest
 from dem.record.files import read_csv
@@ -18,7 +19,7 @@ from dem.strict import equal
 from dem.terminal import warn
 from postprocess.measures.packing import DEFINITIONS
 from postprocess.measures.table import summarise_run
-from studies.calibration.emulator import Array
+from studies.calibration.emulator import LEAST_RUNS, Array
 from studies.calibration.inference import Measured
 from studies.calibration.problem import CONDITION, Problem
 from templates.sweep.render import Value
@@ -72,7 +73,54 @@ class TableSimulator:
         needed |= {datum.measure for datum in problem.data}
         for name in sorted(needed - set(table.columns)):
             raise InputError(f"{source}: column {name!r} is missing; columns are {', '.join(table.columns)}")
-        self.problem, self.table, self.source = problem, table, source
+        self.problem, self.source = problem, source
+        self.table = table.assign(**{name: self._numbers(table[name]) for name in problem.names})
+        self._placed = [self._condition(row) for row in self.table.to_dict("records")]
+        low, high = problem.bounds
+        theta, digits = self.planned(1), 5e-5  # points of waves have five digits
+        self._outside = (theta < low - digits * abs(low)) | (theta > high + digits * abs(high))
+        self._check()
+
+    def _numbers(self, column: pd.Series) -> pd.Series:
+        found = pd.to_numeric(column, errors="coerce")
+        if (wrong := np.flatnonzero(~np.isfinite(found))).size:
+            value = column.iloc[wrong[0]]
+            raise InputError(f"{self.source}, row {wrong[0] + 2}: {column.name} is {value}, not a finite number")
+        return found
+
+    def _condition(self, row: Mapping[Hashable, Value]) -> int | None:
+        """Return the index of the condition of the data that a row matches; None if there is none."""
+        own = {name: row[name] for name in self.problem.conditions[0]}
+        return next((k for k, condition in enumerate(self.problem.conditions) if equal(own, condition)), None)
+
+    def _check(self) -> None:
+        """Raise InputError unless each condition of fitted data has runs within the priors that vary all parameters."""
+        inside = ~self._outside.any(axis=1)
+        for number, condition in enumerate(self.problem.conditions):
+            if not any(datum.fitted and datum.condition == number for datum in self.problem.data):
+                continue
+            matching = np.array([placed == number for placed in self._placed], dtype=np.bool_)
+            place = "".join(f", at {name} {value}" for name, value in condition.items())
+            if (used := int((matching & inside).sum())) < LEAST_RUNS:
+                reason = self._first_outside(matching)
+                raise InputError(
+                    f"{self.source}{place}: {used} of {int(matching.sum())} runs have all parameters within their "
+                    f"priors{reason}; an emulator needs {LEAST_RUNS}: give more runs, or wider priors"
+                )
+            for name, values in self.table[list(self.problem.names)][matching & inside].items():
+                if values.nunique() == 1:
+                    raise InputError(
+                        f"{self.source}{place}: {name} is {values.iloc[0]:g} in all runs within the priors, so that "
+                        "they say nothing about it; give runs that vary it, or make it one of constants, not of free"
+                    )
+
+    def _first_outside(self, among: NDArray[np.bool_]) -> str:
+        """Return in words the first parameter that is outside its prior in one of some runs; "" if none is."""
+        for row, column in np.argwhere(self._outside & among[:, None]):
+            name = self.problem.names[column]
+            low, high = (each[column] for each in self.problem.bounds)
+            return f" (row {row + 2}: {name} is {self.table[name].iloc[row]:g}, its prior {low:g} to {high:g})"
+        return ""
 
     def planned(self, wave: int) -> Array:
         """Return the parameters (n, d) of all rows."""
@@ -80,30 +128,35 @@ class TableSimulator:
         return found
 
     def listing(self) -> str:
-        """Return in words how many runs are at conditions of the data."""
+        """Return in words how many runs are at conditions of the data, within the priors."""
         found = self.run(1, self.planned(1))
         return f"{self.source}: {len(found)} of {len(self.table)} runs are at conditions of the data"
 
     def run(self, wave: int, theta: Array) -> list[tuple[Mapping[str, Value], Measured | None]]:
-        """Return variables and measures of the rows whose variables match a condition of the data.
+        """Return variables and measures of the rows at conditions of the data, with parameters within the priors.
 
-        `wave` and `theta` are not used: the table is the only wave. A warning states how many rows match no condition.
+        `wave` and `theta` are not used: the table is the only wave. Warnings state how many rows are left out.
         """
         found: list[tuple[Mapping[str, Value], Measured | None]] = []
         measures = list(dict.fromkeys(datum.measure for datum in self.problem.data))
-        others = []
-        for row in self.table.to_dict("records"):
-            own = {name: row[name] for name in self.problem.conditions[0]}
-            for index, condition in enumerate(self.problem.conditions):
-                if equal(own, condition):
-                    parameters = {name: row[name] for name in self.problem.names}
-                    found.append(({**parameters, **condition, CONDITION: index}, {m: row[m] for m in measures}))
-                    break
+        others, outside = [], np.zeros(len(self.table), dtype=np.bool_)
+        for number, (row, placed) in enumerate(zip(self.table.to_dict("records"), self._placed, strict=True)):
+            if placed is None:
+                others.append(row)
+            elif self._outside[number].any():
+                outside[number] = True
             else:
-                others.append(own)
+                parameters = {name: row[name] for name in self.problem.names}
+                variables = {**parameters, **self.problem.conditions[placed], CONDITION: placed}
+                found.append((variables, {m: row[m] for m in measures}))
         if others:
-            place = ", ".join(f"{name} {value}" for name, value in others[0].items())
+            place = ", ".join(f"{name} {others[0][name]}" for name in self.problem.conditions[0])
             warn(f"{self.source}: {len(others)} of {len(self.table)} runs are left out: no data are at {place}")
+        if outside.any():
+            warn(
+                f"{self.source}: {int(outside.sum())} of {len(self.table)} runs are left out: outside the priors"
+                f"{self._first_outside(outside)}"
+            )
         return found
 
 
@@ -134,7 +187,8 @@ def measured(run: Run, names: Sequence[str]) -> dict[str, float]:
     table = summarise_run(run, definitions=used, phases={index for _, index in wanted.values()}).set_index("phase")
     found = {}
     for name, (column, index) in wanted.items():
-        if column not in table.columns:
+        row = table.loc[index]
+        if column not in table.columns and row["frames averaged"]:
             raise InputError(f"{run.path}: measure {column!r} is no column; {nearest(column, map(str, table.columns))}")
-        found[name] = float(table.loc[index, column]) if index in table.index else math.nan
+        found[name] = float(row.get(column, math.nan))  # a run of an older version may lack frames of a phase
     return found

@@ -9,7 +9,6 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from dem.display import progress_of
@@ -106,8 +105,7 @@ class Compared:
 def picture(runs: Sequence[Run], path: Path) -> Path:
     """Draw the pile as it was poured, and at the end of each run, side by side; return the path."""
     piles = [Subject(run.path) for run in (runs[0], *runs)]
-    rest = piles[0].run.phases[1].end_s or 0.0
-    poured = int(np.searchsorted(piles[0].frames.times, rest, side="right")) - 1
+    poured = piles[0].frames.in_phase(1)[-1].number
     shown = [[poured], *([len(pile.frames) - 1] for pile in piles[1:])]
     look = Style.of([pile.run for pile in piles], color_by="crossings", size=_SIZE, view=None)
     with whole_file(path, overwrite=True) as temporary:

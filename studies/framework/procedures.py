@@ -22,7 +22,7 @@ from postprocess.measures.pull import averaged, interval_of
 from postprocess.measures.table import summarise_run
 from postprocess.statistics.points import ASPECT, SEED, mean_difference
 from postprocess.statistics.seeds import SeedMean
-from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
+from studies.framework.runs import DEFINITION, duration, last_columns, require_frames, run_columns
 
 STATIC, EXTERNAL, SHAPE, INTERNAL = "static", "external", "shape-change", "internal"
 ORDER = (STATIC, EXTERNAL, SHAPE, INTERNAL)
@@ -109,9 +109,8 @@ def procedure_row(run: Run) -> dict[str, object]:
         raise InputError(msg)
     procedure = PROCEDURES[active.type]
     wanted = range(active.index - 1, active.index + 2)
+    require_frames(run, wanted)
     table = summarise_run(run, definitions=[DEFINITION], phases=set(wanted))
-    if len(table) != len(wanted):
-        raise InputError(f"{run.path}: no frame of its activity or of the rest before or after it; run it again")
     before, during, after = (table.set_index("phase").loc[phase] for phase in wanted)
     theta = settings["theta_deg"] if procedure == INTERNAL else math.nan
     row: dict[str, object] = {PROCEDURE: procedure, THETA: theta, **run_columns(run), ACTIVE: duration(active)}

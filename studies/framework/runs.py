@@ -377,6 +377,13 @@ def _manifest(run: Wanted, origin: Mapping[str, Any]) -> Run:
     return found
 
 
+def require_frames(run: Run, phases: Iterable[int]) -> None:
+    """Raise InputError if a run has no frame of one of the phases with these indices."""
+    for index in phases:
+        if not run.frames.in_phase(index):
+            raise InputError(f"{run.path}: no frame of phase {index} ({run.phases[index].type}); run it again")
+
+
 def duration(phase: Phase) -> float:
     """Return the simulated time of a phase [s]; NaN if the phase has not ended."""
     if phase.start_s is None or phase.end_s is None:

@@ -16,7 +16,7 @@ from postprocess.measures.table import LAST_FRAMES, summarise_run
 from postprocess.statistics.points import ASPECT
 from studies.framework.figures import Histories, History, one_by_one
 from studies.framework.provenance import Reference
-from studies.framework.runs import DEFINITION, duration, last_columns, run_columns
+from studies.framework.runs import DEFINITION, duration, last_columns, require_frames, run_columns
 
 SHAKEN = "time shaken [s]"
 SHAKE_TIME = 20.0  #: Time for which Gravish et al. shook [s]
@@ -163,11 +163,8 @@ def measured_row(run: Run, definitions: Sequence[str]) -> dict[str, object]:
     if shakes[-1].index < run.phases[-1].index:
         wanted["phi_f relaxed"] = run.phases[-1].index
     cheap = [DEFINITION, *(set(definitions) - {DEFINITION} - COSTLY_DEFINITIONS)]
-    summary = summarise_run(run, definitions=cheap, phases=set(wanted.values()))
-    table = summary.set_index("phase") if len(summary) else summary
-    empty = next((phase for phase in wanted.values() if phase not in table.index), None)
-    if empty is not None:
-        raise InputError(f"{run.path}: no frame of phase {empty} ({run.phases[empty].type}); run it again")
+    require_frames(run, wanted.values())
+    table = summarise_run(run, definitions=cheap, phases=set(wanted.values())).set_index("phase")
     row: dict[str, object] = {**run_columns(run), SHAKEN: sum(map(duration, shakes))}
     for definition in DEFINITIONS:
         if definition in cheap:

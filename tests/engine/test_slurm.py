@@ -30,13 +30,13 @@ template: scene.yaml.j2
 run_name: "{{ label }}"
 points:
   list:
-    - {label: a, timeout_s: 5, relax_s: 0.02}
-    - {label: b, timeout_s: 5, relax_s: 0.04}
-    - {label: c, timeout_s: 5, relax_s: 0.06}
-    - {label: d, timeout_s: 5, relax_s: 0.08}
-    - {label: fails, timeout_s: 0.01, relax_s: 0.02}
-    - {label: long, timeout_s: 5, relax_s: 0.5}
-"""
+    - {label: a, timeout_s: 5, relax_s: 0.12}
+    - {label: b, timeout_s: 5, relax_s: 0.14}
+    - {label: c, timeout_s: 5, relax_s: 0.16}
+    - {label: d, timeout_s: 5, relax_s: 0.18}
+    - {label: fails, timeout_s: 0.01, relax_s: 0.12}
+    - {label: long, timeout_s: 5, relax_s: 0.1}
+"""  # `long`, the shortest, is the last task: its number is that of the whole array too
 CLUSTER = """\
 schema_version = 1
 name = "here"
@@ -110,6 +110,7 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
 
     go_on_when_signalled(out / "runs" / "long", held)
     task = record["runs"].index("long")
+    assert task == len(record["runs"]) - 1
     log = out / "jobs" / "001" / f"{task}.txt"
     wait_until(lambda: "queued again" in log.read_text(), log.read_text)
     assert "ended by USR1" in log.read_text()
@@ -129,6 +130,9 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
 
     expected = {**others, "long": "done"}
     wait_until(lambda: states(smarticles, out) == expected, lambda: f"{states(smarticles, out)}: {log.read_text()}")
+    # No other task was queued again with it: each has come to its end once.
+    ends = [(out / "jobs" / "001" / f"{number}.txt").read_text().count("not finished") for number in range(6)]
+    assert ends == [1, 1, 1, 1, 1, 2]
     assert "resumed from the checkpoint" in (out / "runs/long/log.txt").read_text()
     complete(out / "scenes" / "long.yaml", tmp_path / "whole")
     assert len(results(tmp_path / "whole")) > 10
@@ -149,7 +153,7 @@ def test_a_sweep_of_six_with_a_failure_and_a_time_limit(
 def test_a_rejected_job_is_reported_and_nothing_is_lost(
     slurm: SlurmHere, smarticles: Callable[..., str], tmp_path: Path
 ) -> None:
-    for name, text in (("scene.yaml.j2", SCENE), ("sweep.yaml", SWEEP.replace("relax_s: 0.5", "relax_s: 0.1"))):
+    for name, text in (("scene.yaml.j2", SCENE), ("sweep.yaml", SWEEP)):
         (tmp_path / name).write_text(text)
     (tmp_path / "here.toml").write_text(
         CLUSTER.replace("[partitions.only]", "[partitions.only]\n").replace("only", "absent")

@@ -9,15 +9,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy import stats
+from synthetic import SyntheticRun, write_run
 
 from dem.errors import InputError, RunError
+from dem.record.run import Run
 from dem.scene.reading import load_scene
 from smarticles.starters import __file__ as starters
 from studies.calibration import emulator, inference, report
 from studies.calibration.inference import Array, Result, calibrate
 from studies.calibration.measures import columns_of_scene
 from studies.calibration.problem import Datum, Problem, load_problem
-from studies.calibration.simulators import FunctionSimulator, TableSimulator, read_runs
+from studies.calibration.simulators import FunctionSimulator, TableSimulator, measured, read_runs
 
 ASPECTS = (0.4, 0.7, 1.0)
 MEASURES = ("phi_0", "phi_f")
@@ -255,9 +257,70 @@ def test_text_and_booleans_of_a_table_are_those_of_the_data(tmp_path: Path) -> N
     data = "sand,flat,measure,value,error\n007,true,phi,0.1,0.01\n7,false,phi,0.1,0.01\n"
     (tmp_path / "data.csv").write_text(data)
     problem = load_problem(tmp_path / "calibration.yaml")
-    (tmp_path / "runs.csv").write_text("friction,wall,sand,flat,phi\n0.5,0.6,007,TRUE,0.1\n0.5,0.6,7,False,0.2\n")
+    rows = [f"0.{5 + k % 3},0.{5 + k % 2},{own}" for k in range(6) for own in ("007,TRUE,0.1", "7,False,0.2")]
+    (tmp_path / "runs.csv").write_text("\n".join(["friction,wall,sand,flat,phi", *rows]))
     found = TableSimulator(problem, read_runs(tmp_path / "runs.csv", problem), "runs.csv").run(1, np.empty(0))
-    assert [(values["condition"], measured) for values, measured in found] == [(0, {"phi": 0.1}), (1, {"phi": 0.2})]
+    assert [(values["condition"], measured) for values, measured in found] == 6 * [(0, {"phi": 0.1}), (1, {"phi": 0.2})]
+
+
+def test_runs_of_a_table_must_vary_all_parameters_within_their_priors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    problem = written(tmp_path, (0.5, 0.6), keys="budget: 60\nwaves: 1")
+    theta = inference.first_points(problem, 20)
+    table = pd.DataFrame([{**values, **simulated(values)} for values in problem.runs(1, theta)])
+    wide = table.assign(friction=1.5 + table["friction"])
+    with pytest.raises(InputError) as caught:
+        TableSimulator(problem, wide, "runs.csv")
+    assert "runs.csv, at l_over_w 0.4: 0 of 20 runs have all parameters within their priors (row 2: friction is " in (
+        str(caught.value)
+    )
+    assert ", its prior 0.2 to 1); an emulator needs 6: give more runs, or wider priors" in str(caught.value)
+    # Runs outside are left out, since only the priors are of interest.
+    mixed = pd.concat([table, wide], ignore_index=True)
+    found = TableSimulator(problem, mixed, "runs.csv").run(1, theta)
+    assert [values["friction"] for values, _ in found] == table["friction"].tolist()
+    assert "runs.csv: 60 of 120 runs are left out: outside the priors (row 62: friction is " in capsys.readouterr().err
+    for some, place in ((table["wall"] > 0, "0.4"), (table["l_over_w"] == 0.7, "0.7")):
+        with pytest.raises(
+            InputError, match=rf"at l_over_w {place}: wall is 0.7 in all runs within the priors, so that"
+        ):
+            TableSimulator(problem, table.assign(wall=table["wall"].where(~some, 0.7)), "runs.csv")
+    rough = table["wall"].astype(object).where(table.index != 3, "rough")
+    with pytest.raises(InputError, match=r"runs.csv, row 5: wall is rough, not a finite number"):
+        TableSimulator(problem, table.assign(wall=rough), "runs.csv")
+
+
+def test_a_phase_without_a_frame_has_no_value(tmp_path: Path) -> None:
+    run = Run(write_run(tmp_path / "run", SyntheticRun(frames_per_phase=1)))
+    listed = (run.path / "frames.pvd").read_text(encoding="utf-8").splitlines(keepends=True)
+    (run.path / "frames.pvd").write_text("".join(line for line in listed if "frame_000001" not in line), "utf-8")
+    phi = "phi second-highest-com [-]"
+    assert np.isnan(measured(run, [f"{phi} @ 1"])[f"{phi} @ 1"])
+    found = measured(run, [f"{phi} @ 1", f"{phi} @ 2"])
+    assert [np.isfinite(value) for value in found.values()] == [False, True]
+    with pytest.raises(InputError, match="measure 'ph' is no column"):
+        measured(run, ["ph @ 2"])
+
+
+def test_emulators_of_noise_have_no_sobol_indices(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the pure noise of `phi_0` nothing is explained; `phi_f` follows its model."""
+    monkeypatch.setattr(inference, "MOST_STEPS", 500)
+
+    def half(values: Mapping[str, Any]) -> dict[str, float]:
+        noise = 0.1 * (1 + SCATTER * np.random.default_rng(values["seed"]).standard_normal())
+        return {**simulated(values), "phi_0": noise}
+
+    problem = written(tmp_path, (0.5, 0.6), keys="budget: 90\nwaves: 1")
+    result = calibrate(problem, FunctionSimulator(problem, half), say=lambda _: None)
+    assert result is not None
+    indices = result.sensitivity()
+    assert set(indices["measure"]) == {"phi_f"}
+    assert (indices["explained, left out one by one"] > 0.8).all()
+    unseen = [text for text in result.warnings if text.startswith("no effect of any parameter on phi_0")]
+    assert len(unseen) == len(ASPECTS)
+    assert all("noise alone might 29 %; it has no Sobol indices" in text for text in unseen)
+    assert not any("phi_f" in text for text in result.warnings if "no effect" in text)
 
 
 def test_rows_of_a_table_that_are_longer_than_its_header_are_rejected(tmp_path: Path) -> None:

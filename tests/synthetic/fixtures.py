@@ -25,9 +25,10 @@ def scene():
 
 @pytest.fixture(scope="session")
 def make_run(tmp_path_factory):
-    """Writes a run directory; `plan` is a list of (phase, lift of the pile [m]) per frame."""
+    """Writes a run directory; `plan` is a list of (phase, lift of the pile [m]) per frame, each 0.1 s or at `times`."""
 
-    def make(plan=((0, 0.0), (1, 0.0), (2, 0.001)), *, ending=None, series=True):
+    def make(plan=((0, 0.0), (1, 0.0), (2, 0.001)), *, times=None, ending=None, series=True):
+        times = 0.1 * np.arange(len(plan)) if times is None else np.array(times)
         directory = tmp_path_factory.mktemp("run")
         made = SyntheticRun(name="pile", seed=7, count=6, phases=PHASES)
         write_manifest(directory, made, scene_sha256="abc")
@@ -38,13 +39,13 @@ def make_run(tmp_path_factory):
             # The first frame is poured in part only.
             poured = (pile + np.array([0, 0, lift]))[: 1 if number == 0 else None]
             contacts = np.arange(len(poured))
-            mesh = mesh_of(poured, time=0.1 * number, phase=phase, floor_z=-0.002, contacts=contacts)
-            frames.write(mesh, 0.1 * number)
+            frames.write(
+                mesh_of(poured, time=times[number], phase=phase, floor_z=-0.002, contacts=contacts), times[number]
+            )
         if series:
-            times = 0.1 * np.arange(len(plan))
             columns = {
                 "time_s": times,
-                "phase": np.zeros(len(times), dtype=int),
+                "phase": np.array([phase for phase, _ in plan]),
                 "kinetic_energy_J": 10.0 * times,
                 "unbalanced_force": 1.0 - times,
                 "container_force_N": np.outer(times, [1.0, 2.0, 3.0]),

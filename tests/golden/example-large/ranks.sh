@@ -101,7 +101,8 @@ if [ "$signalled" = USR1 ] && [ "$open" -gt 0 ]; then
         echo "task $task: not queued again: it was queued again 3 times; continue with smarticles resume" >&2
     else
         echo "task $task: queued again"
-        scontrol requeue "$SLURM_JOB_ID"
+        # The number of the array's last task is that of the whole array, of which Slurm would queue every task anew.
+        scontrol requeue "${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID"
         exit 0
     fi
 fi

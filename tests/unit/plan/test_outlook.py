@@ -103,7 +103,8 @@ def test_every_column_belongs_to_one_effect() -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "left_out"), [("frame_interval_s", "no frame is written"), ("sphere_interval_s", "no spheres are written")]
+    ("key", "left_out"),
+    [("frame_interval_s", "each phase has one frame, at its end"), ("sphere_interval_s", "no spheres are written")],
 )
 def test_an_interval_longer_than_the_run_gives_a_warning(key: str, left_out: str) -> None:
     assert warnings_of(small({f"recording.{key}": 0.88})) == ()
@@ -183,6 +184,8 @@ def test_a_plan_says_what_frames_and_measures_take() -> None:
     one = plan(small({"count": 40}))
     assert 10_000 < one.measuring.frame_bytes < 20_000  # 12.8 kB of 40 smarticles
     assert f"frames: about {one.frames} of " in one.to_text()
+    # Pour, rest and shake of some 0.9 s at 40 ms, and one frame at the end of each.
+    assert one.frames == 3 + round(sum(phase.estimate_s for phase in one.phases) / 0.04)
     for count, most in ((150, 246), (300, 317), (600, 440)):
         assert most < plan(small({"count": count})).measuring.memory_bytes / 2**20 < 1.2 * most
     rods = {"engine": "links", "count": 400, "particle": {"shape": "rod", "length_m": 0.012, "diameter_m": 1e-3}}
@@ -190,12 +193,3 @@ def test_a_plan_says_what_frames_and_measures_take() -> None:
     assert 150 < planned.measuring.memory_bytes / 2**20 < 190
     assert 40_000 < planned.measuring.frame_bytes < 60_000  # 55.5 kB
     assert "smarticles measure: about 166 MiB of memory in each process, 0.2 s of processor time" in planned.to_text()
-
-
-def test_a_plan_names_phases_that_may_have_no_frame() -> None:
-    phases = [{"type": "deposit"}, *({"type": "relax", "duration_s": duration} for duration in (0.039, 0.04, 0.02))]
-    said = plan(small({"phases": phases, "recording": {"frame_interval_s": 0.04}})).to_text()
-    assert [line[:14] for line in said.splitlines() if "may have no frame" in line] == [
-        "phase 1 relax:",
-        "phase 3 relax:",
-    ]

@@ -50,6 +50,10 @@ def test_frames_of_runs_are_in_metres_above_their_floor(tmp_path: Path) -> None:
     mesh.write(tmp_path / "frame.vtu", file_format="vtu")
     with pytest.raises(InputError, match="body 1 has several kinds"):
         read_poses(tmp_path / "frame.vtu")
+    mesh.cell_data["time_s"] = [np.array([1.0, 1.0, 1.5, 1.5])]
+    mesh.write(tmp_path / "frame.vtu", file_format="vtu")
+    with pytest.raises(InputError, match="it holds 2 times by its cell data time_s; keep one"):
+        read_poses(tmp_path / "frame.vtu")
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import h5py
+import numpy as np
 import pytest
 from double import EngineDouble, KindDouble
 from scenes import CHAIN, SMALL, changed
@@ -135,6 +136,69 @@ def test_a_resumed_run_gives_the_same_bits(
     assert series(tmp_path / "straight") == series(tmp_path / "resumed")
     assert frames(tmp_path / "straight") == frames(tmp_path / "resumed")
     assert not (tmp_path / "resumed" / "failed.json").exists()
+
+
+# Frames each 20 ms, samples each 4 ms: the first relax ends with a sample, between two frames.
+ENDS = {
+    "phases": [
+        {"type": "deposit", "per_layer": 10},
+        {"type": "shake", "duration_s": 0.009},
+        {"type": "shake", "duration_s": 0.005},
+        {"type": "relax", "duration_s": 0.0827},
+        {"type": "relax", "duration_s": 0.01},
+    ]
+}
+
+
+@pytest.mark.parametrize(("name", "files"), [*((name, "vtu") for name in SCENES), ("ends", "vtu"), ("ends", "vtkhdf")])
+def test_each_phase_that_takes_time_ends_with_a_frame(
+    kind: KindDouble, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, files: str
+) -> None:
+    monkeypatch.setitem(SCENES, "ends", (SMALL, ENDS))
+    run(scene_of(name, **{"recording.frames": files}), tmp_path)
+    made = Run(tmp_path)
+    assert (np.diff(made.frames.times) > 0).all()
+    for phase in made.phases:
+        assert phase.start_s is not None
+        part = made.frames.in_phase(phase.index)
+        if phase.end_s == phase.start_s and phase.start_s > 0:
+            assert not part
+            continue
+        assert part[-1].time == phase.end_s
+        # All but the last are at the interval.
+        steady, interval = made.at_intervals(part), 0.02
+        assert len(part) - len(steady) in (0, 1)
+        apart = np.abs(steady.times / interval - np.round(steady.times / interval)) * interval
+        assert (apart <= phase.time_step_s / 2 + 1e-8).all() or len(part) == 1
+        if len(steady) < len(part):
+            assert abs(part.times[-1] / interval - round(part.times[-1] / interval)) * interval > phase.time_step_s / 2
+
+
+@pytest.mark.parametrize("after", [-1, 0, 1])
+def test_a_run_that_stops_beside_the_end_of_a_phase_writes_the_same_frames(
+    kind: KindDouble, interrupted: Callable[[int], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: int
+) -> None:
+    """A checkpoint at each sample; the run stops at the one at the end of the first relax, and beside it."""
+    monkeypatch.setitem(SCENES, "ends", (SMALL, ENDS))
+    straight, resumed = tmp_path / "straight", tmp_path / "resumed"
+    scene = scene_of("ends", **{"recording.checkpoint_interval_s": 0.004, "recording.contact_forces": True})
+    run(scene, straight)
+    end = Run(straight).phases[3].end_s or 0.0
+    number = round(end / 0.004)
+    assert abs(number * 0.004 - end) <= kind.built[0].time_step / 2
+    assert number % 5, "the frame at the end is not at the interval of 20 ms"
+    interrupted(number + after)
+    with pytest.raises(KeyboardInterrupt):
+        run(scene, resumed)
+    assert 0 < len(Run(resumed).frames) < len(Run(straight).frames)
+    interrupted(10_000)
+    run(scene, resumed, resume=True)
+    for folder in ("frames", "forces"):
+        one, other = (
+            {path.name: path.read_bytes() for path in [*(out / folder).iterdir(), out / f"{folder}.pvd"]}
+            for out in (straight, resumed)
+        )
+        assert one == other
 
 
 def test_a_finished_run_is_left_alone(kind: KindDouble, tmp_path: Path) -> None:

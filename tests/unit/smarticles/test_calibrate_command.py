@@ -230,10 +230,11 @@ def test_a_variable_without_effect_is_rejected(calibration: Path, smarticles: Sm
 def test_a_dry_run_checks_a_table_of_runs(calibration: Path, smarticles: Smarticles) -> None:
     table = calibration.parent / "runs.csv"
     calibration.write_text(CALIBRATION + "waves: 1\n")
-    table.write_text(f"mu,n,{PHI}\n0.5,10,0.1\n0.6,12.000000000001,0.1\n0.7,14,0.1\n")
+    rows = [f"0.{mu},{n},0.1" for mu in range(2, 8) for n in ("10", "12.000000000001")]
+    table.write_text("\n".join([f"mu,n,{PHI}", *rows, "0.7,14,0.1\n"]))
     words = ["calibrate", calibration, "--dry-run", "--table", table]
     said = smarticles(*words)
-    assert (said.status, said.out) == (0, f"{table}: 2 of 3 runs are at conditions of the data\n")
-    assert "1 of 3 runs are left out: no data are at n 14" in said.err
+    assert (said.status, said.out) == (0, f"{table}: 12 of 13 runs are at conditions of the data\n")
+    assert "1 of 13 runs are left out: no data are at n 14" in said.err
     table.write_text("mu,n\n0.5,10\n")
     assert f"column '{PHI}' is missing; columns are mu, n" in smarticles(*words).err

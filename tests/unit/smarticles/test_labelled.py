@@ -87,7 +87,7 @@ def test_named_values_keep_the_order_of_the_sweep_in_a_dataset() -> None:
 def test_a_dataset_is_of_the_phase_with_a_number(swept: smarticles.SweepDirectory, wrong: Any) -> None:
     phi = "phi second-highest-com [-]"
     assert swept.to_xarray(phase=2)[phi].sel(aspect_ratio=0.7, seed=1) == pytest.approx(0.2 * 1.002)
-    with pytest.raises(smarticles.InputError, match=r"^phase: no run has frames of phase .*; known: 0, 1, 2, 3$"):
+    with pytest.raises(smarticles.InputError, match=r"^phase: no run has begun phase .*; known: 0, 1, 2, 3$"):
         swept.to_xarray(phase=wrong)
 
 

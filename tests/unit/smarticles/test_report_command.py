@@ -15,6 +15,7 @@ from command_cases import Smarticles, WriteRun
 from scenes import small
 
 from dem.record.document import Kind
+from dem.record.run import Run
 from dem.scene.reading import dump_scene
 from dem.scene.scene import Scene
 from postprocess.pictures import render
@@ -22,7 +23,7 @@ from postprocess.report import figures
 from postprocess.report.series import thinned
 from postprocess.statistics.points import means_by
 from smarticles.reporting.charts import Groups, against_variable
-from smarticles.reporting.run import accuracy_blocks, drawn_as, effect_blocks
+from smarticles.reporting.run import _moment, accuracy_blocks, drawn_as, effect_blocks
 from smarticles.reporting.sweep import _figures
 from smarticles.sweeps import changed_sweep, folder_of, make_folder
 from studies.registry import shipped
@@ -76,7 +77,15 @@ def _few_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
 def run(tmp_path: Path, write_run: WriteRun) -> Path:
     """A run of a scene that this version reads."""
     directory = write_run(tmp_path / "pile", name="my pile")
-    scene = small({"count": 12, "name": "my pile", "engine": "links", "fidelity": {"base": "draft", "rows": 2}})
+    scene = small(
+        {
+            "count": 12,
+            "name": "my pile",
+            "engine": "links",
+            "fidelity": {"base": "draft", "rows": 2},
+            "recording": {"frame_interval_s": 0.125, "series_interval_s": 0.005},  # frames are at multiples of it
+        }
+    )
     (directory / "scene.yaml").write_text(dump_scene(scene), encoding="utf-8")
     return directory
 
@@ -116,6 +125,15 @@ def test_knobs_that_follow_from_the_scene_are_no_changes() -> None:
     blocks = "".join(accuracy_blocks(small({"engine": "links", "fidelity": "standard", "smarticle": square}), None))
     assert "this run" in blocks
     assert "This scene changes" not in blocks
+
+
+def test_pictures_name_the_phase_and_the_moment_of_their_frame(run: Path) -> None:
+    assert _moment(Run(run)) == "at the end of relax"
+    listed = (run / "frames.pvd").read_text(encoding="utf-8").splitlines(keepends=True)
+    # As of older versions, whose last phases could end without a frame.
+    kept = [line for line in listed if not re.search(r"frame_0000(1[1-9])", line)]
+    (run / "frames.pvd").write_text("".join(kept), encoding="utf-8")
+    assert _moment(Run(run)) == "at 16.5 s, in shake"
 
 
 def test_nothing_leaves_the_page_and_nothing_runs_in_it(run: Path, smarticles: Smarticles) -> None:

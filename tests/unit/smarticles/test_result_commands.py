@@ -184,34 +184,42 @@ def test_the_legend_is_about_columns_that_are_printed(
     assert "SE:" in smarticles("measure", write_run(tmp_path / "b")).out
 
 
-def test_a_phase_without_a_frame_is_not_called_unknown(
+def test_a_phase_that_takes_no_time_has_a_row_without_means(
     tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
 ) -> None:
     run = write_run(tmp_path / "a")
     for name in ("run.json", "done.json"):
         manifest = json.loads((run / name).read_text())
         last = manifest["phases"][-1]
-        manifest["phases"].append({**last, "index": last["index"] + 1, "type": "release"})
+        end = {"start_s": last["end_s"], "end_s": last["end_s"]} if "end_s" in last else {}
+        manifest["phases"].append({**last, **end, "index": last["index"] + 1, "type": "release"})
         (run / name).write_text(json.dumps(manifest))
-    said = smarticles("measure", run, "--phase", "release")
-    assert said.status == 2
-    assert "--phase release: no frame lies in a phase of this type" in said.err
-    assert "known: deposit, relax, shake, last" in said.err
+    for phase in ("release", "last"):
+        (row,) = json.loads(smarticles("measure", run, "--phase", phase, "--json").out)
+        assert (row["phase"], row["phase type"], row["time [s]"]) == (4, "release", 22.0)
+        assert (row["frames averaged"], row["phi second-highest-com [-]"]) == (0, None)
+    assert "note:" not in smarticles("measure", run).out
+    said = smarticles("measure", run, "--phase", "lift")
+    assert (said.status, "no run has a phase 'lift'" in said.err) == (2, True)
 
 
-def test_a_phase_without_frames_is_named(tmp_path: Path, write_run: WriteRun, smarticles: Smarticles) -> None:
+def test_phases_of_older_runs_without_frames_keep_their_rows_and_are_named(
+    tmp_path: Path, write_run: WriteRun, smarticles: Smarticles
+) -> None:
     runs = [write_run(tmp_path / name, frames_per_phase=1) for name in ("a", "b", "whole")]
     for run in runs[:2]:
         listed = (run / "frames.pvd").read_text(encoding="utf-8").splitlines(keepends=True)
         kept = [line for line in listed if "frame_000001" not in line]
         (run / "frames.pvd").write_text("".join(kept), encoding="utf-8")
     said = smarticles("measure", *runs)
-    note = f"note: {runs[0]} and 1 more: phase 1 (relax) ended before a frame was due, and has no row; lower"
+    note = f"note: {runs[0]} and 1 more: phase 1 (relax) has no frame, and so no means; run it anew"
     assert [line for line in said.out.splitlines() if line.startswith("note:")] == [
-        f"{note} recording.frame_interval_s"
+        f"{note}, since each phase now ends with a frame"
     ]
     assert note in smarticles("measure", *runs, "--by", "seed").out
     assert "note:" not in smarticles("measure", runs[2]).out
+    rows = json.loads(smarticles("measure", runs[0], "--json").out)
+    assert [(row["phase"], row["frames averaged"]) for row in rows] == [(0, 1), (1, 0), (2, 1), (3, 1)]
 
 
 def test_measure_keeps_the_tables_of_runs_that_have_not_changed(

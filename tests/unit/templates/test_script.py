@@ -170,7 +170,8 @@ class ByHand:
         environment = {
             "PATH": f"{self.bin}:{os.environ['PATH']}",
             "SLURM_ARRAY_TASK_ID": str(task),
-            "SLURM_JOB_ID": "77",
+            "SLURM_ARRAY_JOB_ID": "77",
+            "SLURM_JOB_ID": "77",  # as in the last task
             "SLURM_RESTART_COUNT": str(restarts),
         }
         return subprocess.Popen(
@@ -226,7 +227,7 @@ def test_a_signal_reaches_every_run_and_the_task_is_queued_again(by_hand: ByHand
     assert said.splitlines() == [
         "task 0: 1 finished, 0 failed, 2 not finished, ended by USR1",
         "task 0: queued again",
-        "scontrol requeue 77",
+        "scontrol requeue 77_0",
     ]
     assert process.returncode == 0
 

@@ -75,6 +75,16 @@ def test_units_are_those_of_the_coordinates_in_any_spelling(tmp_path, header, un
         (CSV.replace("2, ", "9007199254740992.0, "), None, "line 2: body 9007199254740992.0 is no whole number"),
         (CSV.replace("5, 0, 0, 8", "5, 0, 0, 9"), None, "all points of body 5 coincide"),
         (CSV[: CSV.index("\n") + 1], None, "it holds no segment"),
+        *(
+            (
+                f"{name}body,x [mm],y,z\n0,1,0,0,0\n0,1,1,0,0\n5,1,0,0,9\n5,1,1,0,9\n",
+                None,
+                f"column {said} has 2 values",
+            )
+            for name, said in (("frame,", "frame"), ("Time [s],", "time"), ("t [ms],", "t"), ("timestep,", "timestep"))
+        ),
+        ("body,index,x [mm],y,z\n1,0,0,0,0\n1,1,1,0,0\n1,0,0,0,9\n", None, "line 4: body 1 has index 0 twice; number"),
+        ("body,index,x [mm],y,z\n1,0,0,0,0\n1,,1,0,0\n", None, "line 3: index is nan, no number"),
         ("", None, "cannot read centre lines .*; a CSV file needs columns"),
     ],
 )
@@ -82,6 +92,25 @@ def test_tables_that_say_too_little_are_rejected(tmp_path, text, unit, message):
     (tmp_path / "a.csv").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match=message):
         read_centrelines(tmp_path / "a.csv", unit=unit)
+
+
+def test_points_are_in_the_order_of_their_index_and_one_time_is_no_matter(tmp_path):
+    rows = ["frame,time [s],body,index,x [mm],y,z"]
+    rows += [f"3,0.5,{body},{index},{index**2},{body},0" for index in (10, 2, 0) for body in (7, 4)]
+    (tmp_path / "a.csv").write_text("\n".join(rows), encoding="utf-8")
+    found = read_centrelines(tmp_path / "a.csv")
+    assert found.body.tolist() == [4, 4, 7, 7]
+    np.testing.assert_allclose(1e3 * found.segments[:, :, 0], [[0, 4], [4, 100]] * 2)
+
+
+def test_lines_of_several_times_in_one_vtk_file_are_rejected(tmp_path):
+    points, cells = np.array([[0, 0, 0], [1, 0, 0], [0, 0, 1], [1, 0, 1.0]]), [("line", np.array([[0, 1], [2, 3]]))]
+    several = {"cell data time_s": {"cell_data": {"time_s": [[0.1, 0.2]]}}}
+    several["point data frame"] = {"point_data": {"frame": [0, 0, 1, 1]}}
+    for number, (said, data) in enumerate(several.items()):
+        meshio.Mesh(points, cells, **data).write(tmp_path / f"{number}.vtu")
+        with pytest.raises(InputError, match=f"{said} has 2 values: it holds the bodies at several times; keep one"):
+            read_centrelines(tmp_path / f"{number}.vtu", unit="m")
 
 
 def test_files_that_are_missing_or_of_another_kind_are_rejected(tmp_path):

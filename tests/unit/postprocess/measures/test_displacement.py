@@ -57,7 +57,7 @@ def test_what_is_neither_frames_nor_positions_is_rejected(make_run):
 @pytest.mark.parametrize(
     ("times", "words"),
     [
-        ([0, 1, 2, 2.5], ["frame 3", "0.5 s", "1 s", "[:-1]"]),
+        ([0, 1, 2, 2.5], ["frame 3", "0.5 s", "1 s", "at_intervals"]),
         ([0, 1], ["(4,)"]),
         ([0, 0, 0, 0], ["equal intervals"]),
         ([0, 1, np.nan, 3], ["frame"]),

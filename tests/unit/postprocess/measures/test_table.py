@@ -104,6 +104,48 @@ def test_summary_averages_the_last_frames_of_each_phase(make_run):
     assert (shake["name"], shake["seed"]) == ("pile", 7)
 
 
+RECORDING = "recording: {frame_interval_s: 0.1, series_interval_s: 0.05}\n"
+
+
+def test_the_frame_at_the_end_of_a_phase_gives_its_state_and_no_weight_to_means(make_run):
+    plan = [(0, 0.0), (1, 0.0), *((2, 0.001 * k) for k in range(5))]
+    # The frames at 0.235 s and 0.63 s end their phases.
+    run = Run(make_run(plan, times=[0.1, 0.235, 0.3, 0.4, 0.5, 0.6, 0.63]))
+    with (run.path / "scene.yaml").open("a") as file:
+        file.write(RECORDING)
+    frames = measure_run(run)
+    assert run.at_intervals(run.frames.in_phase(1)).times.tolist() == [0.235]
+    assert run.at_intervals(run.frames.in_phase(2)).times.tolist() == [0.3, 0.4, 0.5, 0.6]
+    assert run.at_intervals(run.frames.in_phase(2)[:3]).times.tolist() == [0.3, 0.4, 0.5]
+    rest, shake = summarise_run(run, last=3).iloc[1], summarise_run(run, last=3).iloc[2]
+    assert (rest["frames averaged"], shake["frames averaged"]) == (1, 3)
+    assert rest[PHI] == frames[PHI][1]
+    assert shake[PHI] == pytest.approx(frames[PHI][3:6].mean())
+    assert (rest["time [s]"], shake["time [s]"]) == (0.235, 0.63)
+    voxel = "phi voxel [-]"
+    assert np.isfinite(shake[voxel]) == np.isfinite(frames[voxel].iloc[-1])
+    assert shake[voxel] == pytest.approx(frames[voxel].iloc[-1], nan_ok=True)
+
+
+def test_a_phase_without_a_frame_has_a_row_of_what_its_series_tells(make_run):
+    run = Run(make_run([(0, 0.0), (2, 0.0), (2, 0.001)]))
+    assert summarise_run(run)["phase"].tolist() == [0, 1, 2]
+    empty = summarise_run(run).iloc[1]
+    assert (empty["phase type"], empty["frames averaged"], empty["name"]) == ("relax", 0, "pile")
+    assert empty[["time [s]", PHI, "com height [m]", "kinetic energy [J]"]].isna().all()
+    assert summarise_run(run, phases={1})["phase"].tolist() == [1]
+    # A phase that has not begun has no row.
+    assert summarise_run(Run(make_run([(0, 0.0), (1, 0.0)])))["phase"].tolist() == [0, 1]
+
+
+def test_values_of_the_series_are_those_of_the_frames_phase(make_run):
+    run = Run(make_run([(0, 0.0), (1, 0.0), (2, 0.0)], times=[0.0, 0.16, 0.2]))
+    with h5py.File(run.path / "series.h5", "a") as file:
+        file["time_s"][:] = [0.0, 0.1, 0.17]
+    row = measure_run(run).iloc[1]
+    assert row["kinetic energy [J]"] == 1.6  # of the sample at 0.1 s, although that at 0.17 s is nearer
+
+
 def test_a_measure_that_is_named_fills_every_frame(make_run):
     run = Run(make_run([(1, 0.0), (1, 0.0), (1, 0.0), (2, 0.001)]))
     found = measure_run(run, also=["crossing-number"])

@@ -98,6 +98,20 @@ def test_film_moves_and_lasts_as_long_as_its_speed_says(run, tmp_path, suffix, u
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_all_pictures_of_a_gif_have_one_colour_bar_with_the_colours_of_the_scale(run, tmp_path):
+    drawn, exact = (
+        shown(render_film(run, tmp_path / f"film{suffix}", size=SIZE, color_by="height"))[0]
+        for suffix in (".gif", ".webp")
+    )
+    bars, of_scale = drawn[:, -24:], exact[:, -24:]
+    assert (of_scale == of_scale[0]).all()
+    assert len(np.unique(of_scale[0].reshape(-1, 3), axis=0)) > 100  # the bar is there
+    assert (bars == bars[0]).all()
+    # 256 colours stand for thousands; Pillow's own choice for one picture is off by 40 in places.
+    assert np.percentile(np.abs(bars - of_scale), 99.5) < 20
+    assert np.abs(drawn - exact).mean() < 0.5
+
+
 def test_mp4_without_an_encoder_is_rejected_before_drawing(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     with pytest.raises(InputError, match=r"\.mp4 needs an encoder .*imageio-ffmpeg, or choose \.gif or \.webp"):
