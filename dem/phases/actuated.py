@@ -23,6 +23,7 @@ from dem.setting.motion import Course, Motion, SimpleMotion, Sine, Triangle
 from dem.setting.motor import Motor
 from dem.setting.part import HINGE_RANGE
 from dem.setting.smarticle import Smarticle
+from dem.setting.span import STEPS
 
 BARBS = 2
 BARB_LINKS = (0, 2)
@@ -314,6 +315,8 @@ def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[floa
             highest[barb] = max(highest[barb], high.max())
             source, _ = phase.source_of(f"{key}.{leg.motion.pace[0]}")
             yield from _of_speed(f"phases.{index}.{source}", leg.motion, speed, scene.motor.speed_limit_rad_per_s)
+            if speed:
+                yield from _of_updates(scene, f"phases.{index}.{source}", leg.motion)
     return float(highest[0]), float(highest[1])
 
 
@@ -345,6 +348,19 @@ def _of_speed(place: str, motion: SimpleMotion, speed: float, limit: float) -> I
     yield (
         f"{place}: {present:g} {unit} makes {speed:.4g} rad/s, faster than motor.speed_limit_rad_per_s = "
         f"{limit:g} rad/s; use {way_out} {unit}"
+    )
+
+
+def _of_updates(scene: SceneView, place: str, motion: SimpleMotion) -> Iterator[str]:
+    """Yield an error if control updates, between which motors turn evenly, do not resolve a motion."""
+    interval, series = scene.fidelity.control_interval_s, scene.recording.series_interval_s
+    updates = motion.changes_in / interval
+    if updates >= STEPS * (1 - TOLERANCE):
+        return
+    parts = math.ceil(STEPS * series / motion.changes_in * (1 - TOLERANCE))
+    yield (
+        f"{place}: a {motion.tag()} of {motion.changes_in:.3g} s has {updates:.3g} control updates, {STEPS} resolve "
+        f"it; use a slower one, or a fidelity.control_interval_s of {_whole_fraction(series, parts)} s"
     )
 
 

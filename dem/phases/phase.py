@@ -21,6 +21,7 @@ from dem.errors import RunError
 from dem.setting.container import Container
 from dem.setting.part import Duration, Part, Speed
 from dem.setting.plane import Plane
+from dem.setting.span import Span
 from dem.setting.vibration import Vibration
 
 CHECK_INTERVAL = 0.01  # s between checks whether a layer has come down, a pile has settled, or a force is too large
@@ -84,6 +85,7 @@ class Phase:
     frees: ClassVar[bool] = False  #: Whether the phase takes the container away
     lets_go: ClassVar[bool] = False  #: Whether the phase releases all that earlier phases grip
     needs_links: ClassVar[str] = ""  #: What of the phase only the engine links computes, in words; "": nothing
+    stills: ClassVar[bool] = False  #: Whether the phase ends the active bending of earlier phases
     planar: ClassVar[bool | None] = False
     """Whether the phase is possible in a plane only (True), in a container only (False), or in both (None)."""
 
@@ -151,6 +153,11 @@ class Phase:
         """Return the greatest speed [m/s] that the phase gives to smarticles, but for falls; gravity [m/s²]."""
         shaken = 0.0 if self.vibrated_by is None else self.vibrated_by.peak_speed(gravity)
         return self.pushing_speed(gravity) + shaken
+
+    def spans(self) -> Iterator[Span]:
+        """Yield the times within which what the phase drives changes, except motions that control updates sample."""
+        if self.vibrated_by is not None:
+            yield from self.vibrated_by.spans("vibration.")
 
     @property
     def raises(self) -> float:
@@ -235,6 +242,14 @@ class SceneView(Demand, Protocol):
     @property
     def loose_height(self) -> float: ...
     def seed_for(self, purpose: str) -> int: ...
+
+
+def spans_of_wave(frequency_hz: float, ramp_s: float) -> Iterator[Span]:
+    """Yield the period of active bending, which is 0 Hz where it rests, and the time in which it grows."""
+    if frequency_hz:
+        yield Span(key="frequency_hz", value=f"{frequency_hz:g} Hz", seconds=1 / frequency_hz)
+    if ramp_s:
+        yield Span(key="ramp_s", value=f"{ramp_s:g} s", seconds=ramp_s)
 
 
 def time_left(engine: Engine, end: float) -> float:

@@ -15,12 +15,14 @@ from dem.phases.remove_container import check_wall_is_gone, is_freed
 from dem.phases.travel import (
     check_from_now,
     reject_early_end,
+    span_of_travel,
     stop_at_limit,
     travel_left,
     travel_time,
     travel_to_text,
 )
 from dem.setting.part import BodyNumbers, Duration, Force, Length, Part, Speed
+from dem.setting.span import Span
 from dem.setting.vibration import Vibration
 
 MOVED = 1  # number of the grip that moves; the grip at rest is 0, since all others are released before
@@ -88,6 +90,10 @@ class Tension(Part, Phase):
             yield f"phases.{index}.bodies: there is no body {most}; use 0 to {scene.count - 1}"
         if scene.count < 2:
             yield f"count: {scene.count} smarticle, but phases.{index} (tension) holds one at each end; use at least 2"
+
+    def spans(self) -> Iterator[Span]:
+        yield from super().spans()
+        yield from span_of_travel(self.distance_m, self.speed_m_per_s)
 
     def pushing_speed(self, gravity: float) -> float:
         return self.speed_m_per_s
