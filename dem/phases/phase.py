@@ -269,7 +269,13 @@ class Settle(Part):
     unbalanced_force: float = Field(
         0.05, ge=1e-9, le=1e6, description="mean net force on a smarticle over its weight [1]"
     )
-    hold_s: float = Field(0.05, ge=0, le=1e6, description="time for which both limits must hold [s]")
+    hold_s: float = Field(
+        0.05,
+        ge=0,
+        le=1e6,
+        description="time for which both limits must hold [s]; the default is at least 1.45 √(w/g), 12 times as "
+        "long as a body that turns back is slower than the default speed, with w as there",
+    )
     timeout_s: Duration = Field(
         5.0,
         description="longest wait [s] while the pile loses little energy; then the run fails with the residuals",

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
+from dem.errors import rounded_up
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
 from dem.phases.remove_container import check_wall_is_gone, is_freed
 from dem.setting.hooks import TOLERANCE
@@ -76,7 +77,7 @@ class Shake(Part, Phase):
         if self.taps is not None and self.duration_s < self.tapping_s * (1 - TOLERANCE):
             raise ValueError(
                 f"duration_s: {self.duration_s:g} s is too short for {self.taps} taps and their rests of "
-                f"{self.rest_s:g} s; use at least {self.tapping_s:.6g} s, or leave it out"
+                f"{self.rest_s:g} s; use at least {rounded_up(self.tapping_s, 6)} s, or leave it out"
             )
         return self
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine, Grips
-from dem.errors import RunError
+from dem.errors import RunError, rounded_down
 from dem.phases.compress import check_plate_is_gone
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
 from dem.phases.remove_container import check_wall_is_gone, is_freed
@@ -168,7 +168,8 @@ class Tension(Part, Phase):
         if high - low <= 2 * self.grip_m:
             raise RunError(
                 f"phases.{stage.index}.grip_m: grips of {self.grip_m:g} m at both ends hold the whole pile, whose "
-                f"centres are within {high - low:.3g} m along {self.axis}; use less than {(high - low) / 2:.3g} m"
+                f"centres are within {high - low:.3g} m along {self.axis}; use less than "
+                f"{rounded_down((high - low) / 2)} m"
             )
         ends = places <= low + self.grip_m, places >= high - self.grip_m
         return np.flatnonzero(ends[0]).tolist(), np.flatnonzero(ends[1]).tolist()

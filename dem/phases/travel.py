@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from dem.engine.interface import Engine
+from dem.errors import rounded_up
 from dem.phases.phase import Memory, time_left
 from dem.setting.hooks import TOLERANCE
 from dem.setting.span import Span
@@ -31,7 +32,7 @@ def reject_early_end(what: str, *, duration: float, distance: float, speed: floa
     if duration < needed * (1 - TOLERANCE):
         raise ValueError(
             f"duration_s: {duration:g} s is too short to {what} by distance_m = {distance:g} m at "
-            f"speed_m_per_s = {speed:g} m/s; use at least {needed:.6g} s"
+            f"speed_m_per_s = {speed:g} m/s; use at least {rounded_up(needed, 6)} s"
         )
 
 

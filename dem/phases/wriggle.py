@@ -8,6 +8,7 @@ from pydantic import Field
 
 from dem.body.filament import Activity
 from dem.engine.interface import Engine
+from dem.errors import rounded_down
 from dem.phases.phase import SceneView, TimedPhase, spans_of_wave
 from dem.setting.part import Duration, Length, Part
 from dem.setting.span import Span
@@ -47,7 +48,7 @@ class Wriggle(Part, TimedPhase):
             return ()
         return (
             f"phases.{index}.curvature_per_m: {self.curvature_per_m:g} bends a filament of {scene.sphere_diameter:g} m "
-            f"into itself; use less than {most:.3g}",
+            f"into itself; use at most {rounded_down(most)}",
         )
 
     def spans(self) -> Iterator[Span]:

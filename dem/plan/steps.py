@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from dem.engine.kinds import engine_kind
-from dem.errors import InputError
+from dem.errors import InputError, rounded_down
 from dem.plan.ends import check_ends
 from dem.scene.scene import Scene
 from dem.scene.stiffness import too_soft
@@ -57,7 +57,7 @@ def time_step(scene: Scene) -> float:
         # A damper that acts a period late drives vibrations that are faster than the period.
         raise InputError(
             f"fidelity.control_interval_s: {whole:g} s is {steps} time steps, but a servo (motor.law) must damp in "
-            f"each; use at most {wanted:.3g} s, or softer contacts, servos and strings"
+            f"each; use at most {rounded_down(wanted)} s, or softer contacts, servos and strings"
         )
     return whole / steps
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from dem.errors import rounded_up
 from dem.phases.kinds import KINDS
 from dem.phases.phase import Phase, SceneView
 from dem.phases.place import Place
@@ -159,7 +160,8 @@ def _of_body(scene: SceneView) -> Iterator[str]:
     if particle.boxes.bulge and 0 < particle.boxes.barb_length < least:
         yield (
             f"{key} leaves no room for a sphere of barbs that reach {particle.boxes.barb_length:.4g} m from the hinge; "
-            f"use barbs of at least {least:.4g} m (aspect_ratio {least / particle.boxes.middle_length:.3g}), or a "
+            f"use barbs of at least {rounded_up(least, 4)} m (aspect_ratio "
+            f"{rounded_up(least / particle.boxes.middle_length)}), or a "
             "thinner middle link"
         )
 
@@ -175,7 +177,7 @@ def _of_container(scene: SceneView) -> Iterator[str]:
         if reach > inner and not isinstance(scene.phases[0], Place):  # which checks the poses themselves
             yield (
                 f"container.{key}: {inner:g} m is narrower than {body}, whose farthest point is {reach:.4g} m "
-                f"from its centre of mass; use at least {reach:.4g} m"
+                f"from its centre of mass; use at least {rounded_up(reach, 4)} m"
             )
     height = scene.container.height_m
     if height is not None:
