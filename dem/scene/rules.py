@@ -105,6 +105,7 @@ def _of_bending(scene: SceneView, engine: str) -> Iterator[str]:
             )
     if shapes == {""}:
         return
+    yield from _of_floating(scene)
     bent = max(shapes)
     if engine == "yade" and bent == "filament":
         yield from _of_nodes(scene)
@@ -117,6 +118,19 @@ def _of_bending(scene: SceneView, engine: str) -> Iterator[str]:
     for index, phase in enumerate(scene.phases):
         if phase.kind == "take-over":
             yield f"phases.{index}: take-over reads runs of rigid bodies only; use 'deposit', or 'place' with a frame"
+
+
+def _of_floating(scene: SceneView) -> Iterator[str]:
+    """Yield an error for filaments that are poured but do not sink in their liquid."""
+    if scene.mixture is None or scene.liquid is None or not scene.phases[0].pours:
+        return
+    for filament in (kind.filament for kind in scene.mixture.kinds):
+        if filament is not None and filament.weight_share <= 0:
+            yield (
+                f"particle.density_kg_per_m3: {filament.density:g} kg/m³ is no more than liquid.density_kg_per_m3 = "
+                f"{scene.liquid.density_kg_per_m3:g} kg/m³, so that filaments do not sink and nothing comes down in "
+                "phases.0; use a higher density or a lower one of the liquid, or start with 'place'"
+            )
 
 
 def _of_nodes(scene: SceneView) -> Iterator[str]:
