@@ -6,9 +6,9 @@ from dataclasses import dataclass
 # Steps that resolve a period. Leapfrog moves what is driven by A sin(2πft) by its speed in the middle of each step, so
 # that with n steps a period the amplitude is A (π/n)/sin(π/n): 0.4 % too large at 20, 1.7 % at 10.
 STEPS = 20
-# Cycles that begin and end at steps, with lengths that vary: rounding is half a step at most, so that their frequencies
-# are right to 0.1 %.
-VARYING_STEPS = 500
+# Cycles that begin and end at steps, with lengths that vary: rounding is half a step at most in taps, and one step in a
+# sweep, so that frequencies are right to 0.25 % and 0.5 %.
+VARYING_STEPS = 200
 
 
 @dataclass(frozen=True, kw_only=True)

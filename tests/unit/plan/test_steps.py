@@ -249,5 +249,5 @@ def test_cycles_of_taps_are_whole_and_those_that_vary_are_nearly_so(engine: str,
         steps = 1 / frequency / step
         assert steps >= 20 * (1 - 1e-9)
         assert steps == pytest.approx(round(steps), abs=1e-6)
-    # Of cycles of other lengths each is rounded by half a step at most, 0.1 %.
-    assert tapped(frequency_end_hz=1.2 * frequency) <= 1e-3 / (1.2 * frequency) / 0.5 * (1 + 1e-9)
+    # Taps of other lengths are each rounded by half a step at most, 0.25 %.
+    assert tapped(frequency_end_hz=1.2 * frequency) <= 2.5e-3 / (1.2 * frequency) / 0.5 * (1 + 1e-9)
