@@ -204,7 +204,7 @@ def test_energy_and_forces_of_bodies_in_each_other_do_not_depend_on_their_number
     found = []
     for seed in range(4):
         rng = np.random.default_rng(seed)
-        places = rng.uniform(-8e-3, 8e-3, (count, 3)) + [0, 0, 0.05]
+        places = rng.uniform(-8e-3, 8e-3, (count, 3)) + np.array([0, 0, 0.05])
         turns = Rotation.random(count, random_state=seed)
         energies, pushed = [], []
         for order in (np.arange(count), np.arange(count)[::-1], rng.permutation(count)):

@@ -2,12 +2,14 @@
 
 import math
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scenes import small
 from scipy.spatial.transform import Rotation
+from stopping import assert_goes_on
 
 from dem.body.placement import Poses
 from dem.body.state import FilamentState
@@ -15,7 +17,9 @@ from dem.engine.demand import contact_law_of
 from dem.engine.interface import Engine
 from dem.phases.shake import Shake
 from dem.plan.steps import time_steps
+from dem.record.run import Run
 from dem.run.build import build_engine
+from dem.run.run import run_scene
 from dem.scene.scene import Scene
 from dem.setting.span import STEPS
 
@@ -137,3 +141,21 @@ def test_a_filament_is_too_slow_for_a_fast_wave_and_stays_straight() -> None:
     assert curvature_after(0.0) == pytest.approx(100, rel=0.15)
     # A step of 1/6 ms, which is stable, would take the wave of 6000 Hz for one of 0 Hz.
     assert curvature_after(6000.0) < 5
+
+
+def test_a_run_that_was_stopped_in_a_phase_with_a_step_of_its_own_goes_on_with_equal_bits(tmp_path: Path) -> None:
+    shake = {"type": "shake", "peak_acceleration_g": 20}
+    phases = [
+        {"type": "deposit"},
+        {**shake, "frequency_hz": 1900, "duration_s": 0.02},
+        {**shake, "frequency_hz": 700, "taps": 2, "rest_s": 0.02},
+        {"type": "relax", "duration_s": 0.03},
+    ]
+    recording = {"series_interval_s": 1e-3, "frame_interval_s": 0.01, "checkpoint_interval_s": 0.005}
+    scene = small({"engine": "links", "count": 3, "phases": phases, "recording": recording})
+    run_scene(scene, tmp_path / "whole", command="")
+    run = Run(tmp_path / "whole")
+    ends = [(phase.start_s, phase.end_s) for phase in run.phases]
+    assert [end - start for start, end in ends[1:]] == pytest.approx([0.02, 2 * (1 / 700 + 0.02), 0.03], abs=1e-4)
+    for number in (1, 2):
+        assert_goes_on(scene, run, tmp_path / str(number), sum(ends[number]) / 2)
