@@ -42,11 +42,23 @@ def problems(scene: SceneView, engine: str) -> Iterator[str]:
         yield from phase.check(scene, index)
         if phase.vibrated_by is not None:
             yield from check_shaking(scene, f"phases.{index}.vibration", phase.vibrated_by)
+            yield from _of_windows(index, phase)
     if scene.hooks is not None:
         yield from _of_bars(scene.hooks)
         yield from _of_room(scene, scene.hooks)
     if engine == "lammps":
         yield from _of_lammps(scene)
+
+
+def _of_windows(index: int, phase: Phase) -> Iterator[str]:
+    """Yield an error for a window of a vibration that begins when its phase is over."""
+    windows, length = phase.vibrated_by.windows_s if phase.vibrated_by else None, phase.known_duration
+    for number, (on, off) in enumerate(windows or ()):
+        if length is not None and on >= length:
+            yield (
+                f"phases.{index}.vibration.windows_s.{number}: [{on:g}, {off:g}] s begins after the end of the phase, "
+                f"which takes {length:.6g} s; leave it out, or lengthen the phase"
+            )
 
 
 def _of_order(scene: SceneView) -> Iterator[str]:

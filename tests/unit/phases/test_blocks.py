@@ -319,6 +319,12 @@ def test_new_keys_at_their_defaults_change_no_hash() -> None:
             "or moves: container",
         ),
         (
+            [{**TENSION, "vibration": {"peak_acceleration_g": 1, "windows_s": [[0.1, 0.2], [0.4, 0.5]]}}],
+            {},
+            "phases.1.vibration.windows_s.1: [0.4, 0.5] s begins after the end of the phase, which takes 0.4 s",
+            "lengthen",
+        ),
+        (
             [{"type": "pull-hook", "vibration": {"peak_acceleration_g": 2}}],
             {"hooks": {}, "engine": "yade"},
             "phases.1 (pull-hook): vibration",
