@@ -1,6 +1,7 @@
 """Errors of the project, `InputError` and `RunError`, and functions that word their messages."""
 
 import difflib
+import math
 import re
 from collections.abc import Iterable
 from typing import Any
@@ -22,6 +23,7 @@ def reject(failing: Any, time: float, cause: str, way_out: str) -> None:
         raise RunError(f"at t = {time:.4f} s: {len(ids)} smarticle(s) ({shown}): {cause}; {way_out}")
 
 
+_ROUNDING = 1e-12  # relative error of the product with a power of ten
 _BREAK = re.compile(r"\s*\n\s*")  # as in arrays
 
 
@@ -33,6 +35,23 @@ def shown(value: object) -> str:
     except ValueError:  # a whole number of thousands of digits
         text = "a number of thousands of digits"
     return text if len(text) <= 60 else f"{text[:60]}…"
+
+
+def rounded_up(value: float, digits: int = 3) -> str:
+    """Return, as text, a positive number rounded up to significant digits: a least value that is accepted."""
+    scale = _scale(value, digits)
+    return f"{math.ceil(value * scale * (1 - _ROUNDING)) / scale:.{digits}g}"
+
+
+def rounded_down(value: float, digits: int = 3) -> str:
+    """Return, as text, a positive number rounded down to significant digits: a largest value that is accepted."""
+    scale = _scale(value, digits)
+    return f"{math.floor(value * scale * (1 + _ROUNDING)) / scale:.{digits}g}"
+
+
+def _scale(value: float, digits: int) -> float:
+    """Return the factor that makes a number one with so many digits before the point [1]."""
+    return 10.0 ** (digits - 1 - math.floor(math.log10(value)))
 
 
 def nearest(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:

@@ -17,12 +17,14 @@ from dem.arrays import Array, Flags, Numbers
 from dem.body.particle import HINGE_CLEARANCE
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
+from dem.errors import rounded_down, rounded_up
 from dem.phases.phase import Memory, Phase, SceneView, Stage
 from dem.setting.hooks import TOLERANCE
 from dem.setting.motion import Course, Motion, SimpleMotion, Sine, Triangle
 from dem.setting.motor import Motor
 from dem.setting.part import HINGE_RANGE
 from dem.setting.smarticle import Smarticle
+from dem.setting.span import STEPS
 
 BARBS = 2
 BARB_LINKS = (0, 2)
@@ -76,7 +78,7 @@ class ActuatedPhase(Phase):
         if not gait.active_count(scene.count):
             yield (
                 f"phases.{index}.active_fraction: {gait.active_fraction:g} of {scene.count} smarticles is none; "
-                f"use e.g. {_up(1 / scene.count)}"
+                f"use e.g. {rounded_up(1 / scene.count)}"
             )
         highest = yield from _of_motions(scene, index)
         # Halted motors lag behind the schedule, so that both barbs may be at their highest angles at one time.
@@ -235,7 +237,7 @@ def actuation_warnings(scene: SceneView) -> tuple[str, ...]:
         f"fidelity.control_interval_s = {scene.fidelity.control_interval_s:g} s at motor.speed_limit_rad_per_s = "
         f"{motor.speed_limit_rad_per_s:g} rad/s a motor can exceed it by {excess:.3g} τ_max; use "
         f"control_interval_s: {interval} or stiffness_N_m_per_rad: "
-        f"{_down(motor.stiffness_N_m_per_rad * less)}, or law: slip",
+        f"{rounded_down(motor.stiffness_N_m_per_rad * less)}, or law: slip",
     )
 
 
@@ -253,7 +255,7 @@ def _of_barbs(scene: SceneView, index: int) -> Iterator[str]:
         yield (
             f"smarticle.aspect_ratio: {ratio:g} means barbs of {ratio * width:.4g} m, too short for a sphere of their "
             f"own of {diameter:.4g} m beside the hinge's, which phases.{index} ({scene.phases[index].kind}) needs; use "
-            f"at least {_up(least / width)} or a smaller fidelity.diameter_m"
+            f"at least {rounded_up(least / width)} or a smaller fidelity.diameter_m"
         )
 
 
@@ -314,6 +316,8 @@ def _of_motions(scene: SceneView, index: int) -> Generator[str, None, tuple[floa
             highest[barb] = max(highest[barb], high.max())
             source, _ = phase.source_of(f"{key}.{leg.motion.pace[0]}")
             yield from _of_speed(f"phases.{index}.{source}", leg.motion, speed, scene.motor.speed_limit_rad_per_s)
+            if speed:
+                yield from _of_updates(scene, f"phases.{index}.{source}", leg.motion)
     return float(highest[0]), float(highest[1])
 
 
@@ -328,7 +332,11 @@ def _of_range(place: str, present: float, swing: Sine | Triangle, reached: tuple
     if beyond <= TOLERANCE:
         return
     smaller = 1 - beyond / swing.amplitude_deg
-    way_out = f"use at most {_down(present * smaller)}° or another centre" if smaller > TOLERANCE else "move its centre"
+    way_out = (
+        f"use at most {rounded_down(present * smaller)}° or another centre"
+        if smaller > TOLERANCE
+        else "move its centre"
+    )
     yield (
         f"{place}: {present:g}° makes the barbs reach {reached[too_high > too_low]:.4g}°, outside {lowest:g}° … "
         f"{highest:g}°, the range of the hinges; {way_out}"
@@ -341,10 +349,27 @@ def _of_speed(place: str, motion: SimpleMotion, speed: float, limit: float) -> I
         return
     key, unit = motion.pace
     present = getattr(motion, key)
-    way_out = f"at least {_up(present * factor)}" if key == "duration_s" else f"at most {_down(present / factor)}"
+    way_out = (
+        f"at least {rounded_up(present * factor)}"
+        if key == "duration_s"
+        else f"at most {rounded_down(present / factor)}"
+    )
     yield (
         f"{place}: {present:g} {unit} makes {speed:.4g} rad/s, faster than motor.speed_limit_rad_per_s = "
         f"{limit:g} rad/s; use {way_out} {unit}"
+    )
+
+
+def _of_updates(scene: SceneView, place: str, motion: SimpleMotion) -> Iterator[str]:
+    """Yield an error if control updates, between which motors turn evenly, do not resolve a motion."""
+    interval, series = scene.fidelity.control_interval_s, scene.recording.series_interval_s
+    updates = motion.changes_in / interval
+    if updates >= STEPS * (1 - TOLERANCE):
+        return
+    parts = math.ceil(STEPS * series / motion.changes_in * (1 - TOLERANCE))
+    yield (
+        f"{place}: a {motion.tag()} of {motion.changes_in:.3g} s has {updates:.3g} control updates, {STEPS} resolve "
+        f"it; use a slower one, or a fidelity.control_interval_s of {_whole_fraction(series, parts)} s"
     )
 
 
@@ -370,17 +395,5 @@ def _of_first_spheres(scene: SceneView, index: int, angle: float) -> Iterator[st
     yield (
         f"fidelity.pitch: with {scene.fidelity.pitch:g} the middle link's spheres are {m[0] / d:.3g} diameters apart, "
         f"and the first sphere of a barb touches them at the {angle:.4g}° of phases.{index}; stay below "
-        f"{_down(math.degrees(math.acos(-inward)))}° or use a pitch of at least {_up(wider, 2)}"
+        f"{rounded_down(math.degrees(math.acos(-inward)))}° or use a pitch of at least {rounded_up(wider, 2)}"
     )
-
-
-def _up(value: float, digits: int = 3) -> str:
-    """Return, as text, a positive number rounded up to a number of significant digits."""
-    scale = 10.0 ** (digits - 1 - math.floor(math.log10(value)))
-    return f"{math.ceil(value * scale * (1 - TOLERANCE)) / scale:g}"
-
-
-def _down(value: float) -> str:
-    """Return, as text, a positive number rounded down to three significant digits."""
-    scale = 10.0 ** (2 - math.floor(math.log10(value)))
-    return f"{math.floor(value * scale * (1 + TOLERANCE)) / scale:g}"

@@ -12,8 +12,9 @@ from dem.engine.effect import EffectName
 from dem.engine.interface import Engine, Filaments, Grips
 from dem.phases.compress import Compress, check_plate_is_gone
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
-from dem.phases.travel import reject_early_end, travel_time, travel_to_text
+from dem.phases.travel import reject_early_end, span_of_travel, travel_time, travel_to_text
 from dem.setting.part import LONGEST_LENGTH, BodyNumbers, Duration, Length, Part, Speed, reject_wrong_unit
+from dem.setting.span import Span
 
 
 class Lift(Part, Phase):
@@ -102,6 +103,10 @@ class Lift(Part, Phase):
             return {}
         why = f"phase {index} raises one {travel_to_text(self.distance_m, self.speed_m_per_s)}"
         return {EffectName.GRIPS: why}
+
+    def spans(self) -> Iterator[Span]:
+        yield from super().spans()
+        yield from span_of_travel(self.distance_m, self.speed_m_per_s)
 
     def pushing_speed(self, gravity: float) -> float:
         return self.speed_m_per_s

@@ -21,6 +21,7 @@ from dem.errors import RunError
 from dem.setting.container import Container
 from dem.setting.part import Duration, Part, Speed
 from dem.setting.plane import Plane
+from dem.setting.span import Span
 from dem.setting.vibration import Vibration
 
 CHECK_INTERVAL = 0.01  # s between checks whether a layer has come down, a pile has settled, or a force is too large
@@ -86,6 +87,7 @@ class Phase:
     overlap: ClassVar[float] = 0.0
     """Largest overlap of bodies that the phase puts at given poses, in diameters, from which contacts throw them."""
     needs_links: ClassVar[str] = ""  #: What of the phase only the engine links computes, in words; "": nothing
+    stills: ClassVar[bool] = False  #: Whether the phase ends the active bending of earlier phases
     planar: ClassVar[bool | None] = False
     """Whether the phase is possible in a plane only (True), in a container only (False), or in both (None)."""
 
@@ -152,6 +154,11 @@ class Phase:
         """Return the greatest speed [m/s] that the phase gives to smarticles, but for falls; gravity [m/s²]."""
         shaken = 0.0 if self.vibrated_by is None else self.vibrated_by.peak_speed(gravity)
         return self.pushing_speed(gravity) + shaken
+
+    def spans(self) -> Iterator[Span]:
+        """Yield the times within which what the phase drives changes, except motions that control updates sample."""
+        if self.vibrated_by is not None:
+            yield from self.vibrated_by.spans("vibration.")
 
     @property
     def raises(self) -> float:
@@ -238,6 +245,14 @@ class SceneView(Demand, Protocol):
     def seed_for(self, purpose: str) -> int: ...
 
 
+def spans_of_wave(frequency_hz: float, ramp_s: float) -> Iterator[Span]:
+    """Yield the period of active bending, which is 0 Hz where it rests, and the time in which it grows."""
+    if frequency_hz:
+        yield Span(key="frequency_hz", value=f"{frequency_hz:g} Hz", seconds=1 / frequency_hz)
+    if ramp_s:
+        yield Span(key="ramp_s", value=f"{ramp_s:g} s", seconds=ramp_s)
+
+
 def time_left(engine: Engine, end: float) -> float:
     """Return the simulated time [s] that is left until the time `end` [s]; 0 if less than half a step."""
     left = end - engine.time
@@ -255,7 +270,13 @@ class Settle(Part):
     unbalanced_force: float = Field(
         0.05, ge=1e-9, le=1e6, description="mean net force on a smarticle over its weight [1]"
     )
-    hold_s: float = Field(0.05, ge=0, le=1e6, description="time for which both limits must hold [s]")
+    hold_s: float = Field(
+        0.05,
+        ge=0,
+        le=1e6,
+        description="time for which both limits must hold [s]; the default is at least 1.45 √(w/g), 12 times as "
+        "long as a body that turns back is slower than the default speed, with w as there",
+    )
     timeout_s: Duration = Field(
         5.0,
         description="longest wait [s] while the pile loses little energy; then the run fails with the residuals",

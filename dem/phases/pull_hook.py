@@ -12,6 +12,7 @@ from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, ti
 from dem.phases.travel import (
     check_from_now,
     reject_early_end,
+    span_of_travel,
     stop_at_limit,
     travel_left,
     travel_time,
@@ -19,6 +20,7 @@ from dem.phases.travel import (
 )
 from dem.setting.hooks import Hooks, with_defaults
 from dem.setting.part import Duration, Force, Length, Part, Speed
+from dem.setting.span import Span
 from dem.setting.vibration import Vibration
 
 
@@ -89,6 +91,10 @@ class PullHook(Part, Phase):
             f"{width:.3g} m, so that links are wedged there and stop the run; use at most "
             f"{0.995 * (hooks.length_m - 2 * (width - gap)):.3g} m or a wider container",
         )
+
+    def spans(self) -> Iterator[Span]:
+        yield from super().spans()
+        yield from span_of_travel(self.distance_m, self.speed_m_per_s)
 
     def pushing_speed(self, gravity: float) -> float:
         return self.speed_m_per_s

@@ -14,6 +14,7 @@ class Relax(Part, TimedPhase):
 
     planar: ClassVar[bool | None] = None
     at_rest: ClassVar[bool] = True
+    stills: ClassVar[bool] = True
     type: Literal["relax"]
     duration_s: Duration = Field(0.5, description="length of the phase [s]")
 

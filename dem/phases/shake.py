@@ -8,10 +8,12 @@ from pydantic import Field, model_validator
 
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
+from dem.errors import rounded_up
 from dem.phases.phase import Memory, Phase, SceneView, Stage, time_left
 from dem.phases.remove_container import check_wall_is_gone, is_freed
 from dem.setting.hooks import TOLERANCE
 from dem.setting.part import Duration, Part
+from dem.setting.span import STEPS, VARYING_STEPS, Span
 from dem.setting.vibration import Moved, PeakAcceleration, ShakingFrequency, Vibration, shaking_amplitude
 
 # Largest amplitude in sphere diameters. The rounding of positions at this height, 2⁻⁵³ of it, is 1e-11 diameters, still
@@ -75,7 +77,7 @@ class Shake(Part, Phase):
         if self.taps is not None and self.duration_s < self.tapping_s * (1 - TOLERANCE):
             raise ValueError(
                 f"duration_s: {self.duration_s:g} s is too short for {self.taps} taps and their rests of "
-                f"{self.rest_s:g} s; use at least {self.tapping_s:.6g} s, or leave it out"
+                f"{self.rest_s:g} s; use at least {rounded_up(self.tapping_s, 6)} s, or leave it out"
             )
         return self
 
@@ -146,6 +148,20 @@ class Shake(Part, Phase):
         """Return the key of the scene to change for another frequency than this [Hz], of those along the ramp."""
         end = frequency == self.frequency_end_hz != self.frequency_hz
         return "frequency_end_hz" if end else "frequency_hz"
+
+    def spans(self) -> Iterator[Span]:
+        if not self.peak_acceleration:
+            return
+        highest = max(self.frequency_hz, self.frequency_end_hz or 0.0)
+        varies = self.frequency_end_hz not in (None, self.frequency_hz)
+        yield Span(
+            key=self.frequency_key(highest),
+            value=f"{highest:g} Hz",
+            seconds=1 / highest,
+            steps=VARYING_STEPS if varies else STEPS,
+            # Cycles of varying lengths have no common step.
+            whole=not varies and (self.taps is not None or self.sweeps),
+        )
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
         if not 0 < self.peak_acceleration < 1:

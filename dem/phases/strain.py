@@ -8,6 +8,7 @@ from pydantic import Field
 from dem.body.chain import parted
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
+from dem.errors import rounded_up
 from dem.phases.actuated import ActuatedPhase, Gait
 from dem.phases.arrange import chain_of
 from dem.phases.phase import CHECK_INTERVAL, SceneView, Stage
@@ -50,7 +51,7 @@ class Strain(Part, ActuatedPhase):
         if self.string_length_m < chain.width:
             yield (
                 f"phases.{index}.string_length_m: {self.string_length_m:g} m does not reach the axis from a barb of a "
-                f"chain that is h = {chain.width:.4g} m wide; use at least {chain.width:.4g} m"
+                f"chain that is h = {chain.width:.4g} m wide; use at least {rounded_up(chain.width, 4)} m"
             )
 
     def pushing_speed(self, gravity: float) -> float:

@@ -8,19 +8,21 @@ from pydantic import Field, model_validator
 
 from dem.engine.effect import EffectName
 from dem.engine.interface import Engine, Grips
-from dem.errors import RunError
+from dem.errors import RunError, rounded_down
 from dem.phases.compress import check_plate_is_gone
 from dem.phases.phase import CHECK_INTERVAL, Memory, Phase, SceneView, Stage, time_left
 from dem.phases.remove_container import check_wall_is_gone, is_freed
 from dem.phases.travel import (
     check_from_now,
     reject_early_end,
+    span_of_travel,
     stop_at_limit,
     travel_left,
     travel_time,
     travel_to_text,
 )
 from dem.setting.part import BodyNumbers, Duration, Force, Length, Part, Speed
+from dem.setting.span import Span
 from dem.setting.vibration import Vibration
 
 MOVED = 1  # number of the grip that moves; the grip at rest is 0, since all others are released before
@@ -88,6 +90,10 @@ class Tension(Part, Phase):
             yield f"phases.{index}.bodies: there is no body {most}; use 0 to {scene.count - 1}"
         if scene.count < 2:
             yield f"count: {scene.count} smarticle, but phases.{index} (tension) holds one at each end; use at least 2"
+
+    def spans(self) -> Iterator[Span]:
+        yield from super().spans()
+        yield from span_of_travel(self.distance_m, self.speed_m_per_s)
 
     def pushing_speed(self, gravity: float) -> float:
         return self.speed_m_per_s
@@ -162,7 +168,8 @@ class Tension(Part, Phase):
         if high - low <= 2 * self.grip_m:
             raise RunError(
                 f"phases.{stage.index}.grip_m: grips of {self.grip_m:g} m at both ends hold the whole pile, whose "
-                f"centres are within {high - low:.3g} m along {self.axis}; use less than {(high - low) / 2:.3g} m"
+                f"centres are within {high - low:.3g} m along {self.axis}; use less than "
+                f"{rounded_down((high - low) / 2)} m"
             )
         ends = places <= low + self.grip_m, places >= high - self.grip_m
         return np.flatnonzero(ends[0]).tolist(), np.flatnonzero(ends[1]).tolist()

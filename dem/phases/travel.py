@@ -1,11 +1,13 @@
 """Functions for phases that move a hook, a grip or a plate at constant speed, and check the force on it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from dem.engine.interface import Engine
+from dem.errors import rounded_up
 from dem.phases.phase import Memory, time_left
 from dem.setting.hooks import TOLERANCE
+from dem.setting.span import Span
 
 HELD_SECONDS = 0.1  # s, time for which the force is measured on a hook or a grip that its limit has stopped
 
@@ -13,6 +15,12 @@ HELD_SECONDS = 0.1  # s, time for which the force is measured on a hook or a gri
 def travel_time(data: Mapping[str, Any]) -> float:
     """Return the default of `duration_s` [s], from values of a phase's other fields by name."""
     return float(data["distance_m"] / data["speed_m_per_s"])
+
+
+def span_of_travel(distance: float, speed: float) -> Iterator[Span]:
+    """Yield the time that a travel over a distance [m] at a speed [m/s] takes; nothing without travel."""
+    if distance:
+        yield Span(key="distance_m", value=f"{distance:g} m at {speed:g} m/s", seconds=distance / speed)
 
 
 def reject_early_end(what: str, *, duration: float, distance: float, speed: float) -> None:
@@ -24,7 +32,7 @@ def reject_early_end(what: str, *, duration: float, distance: float, speed: floa
     if duration < needed * (1 - TOLERANCE):
         raise ValueError(
             f"duration_s: {duration:g} s is too short to {what} by distance_m = {distance:g} m at "
-            f"speed_m_per_s = {speed:g} m/s; use at least {needed:.6g} s"
+            f"speed_m_per_s = {speed:g} m/s; use at least {rounded_up(needed, 6)} s"
         )
 
 

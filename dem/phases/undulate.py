@@ -8,10 +8,11 @@ from pydantic import Field
 
 from dem.body.linkage import Linkage, Swing, Undulation
 from dem.engine.interface import Engine
-from dem.phases.phase import SceneView, TimedPhase
+from dem.phases.phase import SceneView, TimedPhase, spans_of_wave
 from dem.setting.hooks import TOLERANCE
 from dem.setting.joints import BENT, Bend
 from dem.setting.part import Duration, Part
+from dem.setting.span import Span
 
 Amplitude = Annotated[float, Field(ge=0, le=BENT)]
 
@@ -107,6 +108,10 @@ class Undulate(Part, TimedPhase):
                     f"{fastest:.3g} rad/s at joint {swing.joint}, whose speed_limit_rad_per_s is {joint.speed:g}; "
                     "swing less or slower"
                 )
+
+    def spans(self) -> Iterator[Span]:
+        swings = any((self.amplitude_deg, *(motion.amplitude_deg for motion in self.joints)))
+        yield from spans_of_wave(self.frequency_hz if swings else 0.0, self.ramp_s)
 
     @property
     def undulation(self) -> Undulation:

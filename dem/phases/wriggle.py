@@ -1,15 +1,17 @@
 """The phase in which filaments bend actively."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import ClassVar, Literal
 
 from pydantic import Field
 
 from dem.body.filament import Activity
 from dem.engine.interface import Engine
-from dem.phases.phase import SceneView, TimedPhase
+from dem.errors import rounded_down
+from dem.phases.phase import SceneView, TimedPhase, spans_of_wave
 from dem.setting.part import Duration, Length, Part
+from dem.setting.span import Span
 
 TIGHTEST = 0.5  # of a filament's curvature times its diameter: a bend in which it would touch itself
 
@@ -46,8 +48,12 @@ class Wriggle(Part, TimedPhase):
             return ()
         return (
             f"phases.{index}.curvature_per_m: {self.curvature_per_m:g} bends a filament of {scene.sphere_diameter:g} m "
-            f"into itself; use less than {most:.3g}",
+            f"into itself; use at most {rounded_down(most)}",
         )
+
+    def spans(self) -> Iterator[Span]:
+        if self.curvature_per_m:
+            yield from spans_of_wave(self.frequency_hz, self.ramp_s)
 
     @property
     def activity(self) -> Activity:

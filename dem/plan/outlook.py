@@ -9,7 +9,7 @@ from dem.engine.effect import Adds
 from dem.engine.kinds import engine_kind
 from dem.plan.doubts import doubts_of
 from dem.plan.effects import Decision, decide
-from dem.plan.steps import stable_step, time_steps
+from dem.plan.steps import limiting_spans, stable_step, time_steps
 from dem.record.sizes import MIB, MeasuringCost, measuring_cost
 from dem.scene.scene import Scene
 from dem.scene.stiffness import expected_overlaps, too_soft
@@ -36,6 +36,7 @@ class PlannedPhase:
     estimate_s: float  #: Simulated time, estimated where `duration_s` is None
     wall_s: float  #: Expected wall time
     time_step_s: float
+    step_set_by: str = ""  #: Key and value that need this step; "" where stability decides it
 
 
 @dataclass(frozen=True)
@@ -83,13 +84,17 @@ class Plan:
         smooth = f"smooth links of {_strands(self.most_strands)}"
         section = smooth if self.strands else f"{self.spheres_per_smarticle} spheres"
         wall = "in a plane" if self.planar else f"wall {1e3 * self.container_height_m:.0f} mm high"
-        first = next(k for k, phase in enumerate(self.phases) if phase.time_step_s == self.time_step_s)
-        earlier = f" from phase {first} on, {self.phases[0].time_step_s:.3g} s before" if first else ""
         lines = [
             f"{self.name}: {self.count} {self.bodies} of {section}, d = {1e3 * self.sphere_diameter_m:.3g} mm, {wall}",
             *self._engine_to_text(),
             *self.protocol,
-            f"time step {self.time_step_s:.3g} s (stable up to {self.stable_time_step_s:.3g} s)" + earlier,
+            f"time step {self._steady_steps[-1]:.3g} s (stable up to {self.stable_time_step_s:.3g} s)"
+            + self._earlier_to_text(),
+            *(
+                f"phase {phase.index}: {phase.time_step_s:.3g} s, as {phase.step_set_by} needs"
+                for phase in self.phases
+                if phase.step_set_by
+            ),
             "contacts give way by about "
             + ", ".join(f"{overlap:.2g} of a link's thickness in {cause}" for cause, overlap in self.overlaps.items()),
             "",
@@ -115,6 +120,17 @@ class Plan:
         lines += ["", "engines: " + ", ".join(self.engines), *self._measuring_to_text()]
         lines += [f"warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
+
+    @property
+    def _steady_steps(self) -> list[float]:
+        """Time steps [s] of the phases in which stability decides them, if there are any, else of all phases."""
+        return [phase.time_step_s for phase in self.phases if not phase.step_set_by] or [self.time_step_s]
+
+    def _earlier_to_text(self) -> str:
+        """Return where motors, which need a shorter time step, begin."""
+        steady = {phase.index: phase.time_step_s for phase in self.phases if not phase.step_set_by}
+        first = next((k for k, step in steady.items() if step == self._steady_steps[-1]), 0)
+        return f" from phase {first} on, {self._steady_steps[0]:.3g} s before" if first else ""
 
     def _measuring_to_text(self) -> list[str]:
         """Return lines about the frames, and about the memory and time that measures take."""
@@ -142,7 +158,7 @@ class Plan:
         return [
             f"engine {self.engine}: fidelity.rows are strands; {idle} have no meaning here",
             f"fidelity {self.fidelity}: {_strands(self.strands)}{more}, {self.stiffness_N_per_m:g} N/m, time step "
-            f"{self.time_step_s / self.stable_time_step_s:.2g} of the stable one{usual}",
+            f"{self._steady_steps[-1] / self.stable_time_step_s:.2g} of the stable one{usual}",
         ]
 
 
@@ -185,10 +201,13 @@ def planned_phases(scene: Scene, steps: Sequence[float] | None = None) -> tuple[
     `steps` are the time steps of the phases [s]; None: those of the scene.
     """
     kind, phases = engine_kind(scene.engine), []
+    limits = limiting_spans(scene)
     for index, (phase, dt) in enumerate(zip(scene.phases, steps or time_steps(scene), strict=True)):
         estimate = phase.expected_duration(scene)
         wall = kind.seconds_per_second(scene, dt, scene.activity(index)) * estimate
-        phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt))
+        limit = limits[index]
+        set_by = "" if limit is None else f"{limit.key} ({limit.value})"
+        phases.append(PlannedPhase(index, phase.kind, phase.known_duration, estimate, wall, dt, set_by))
     return tuple(phases)
 
 

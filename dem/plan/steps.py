@@ -2,14 +2,16 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from dem.engine.kinds import engine_kind
-from dem.errors import InputError
+from dem.errors import InputError, rounded_down
 from dem.plan.ends import check_ends
 from dem.scene.scene import Scene
 from dem.scene.stiffness import too_soft
-from dem.strict import unit_of
+from dem.setting.span import Span
+from dem.strict import SAME, unit_of
 
 # Largest distance, in sphere diameters, by which boundaries may move in a step. Measured with a hook
 # pulled out of piles of 30, draft and standard, 3 to 4 seeds: the deepest contact is 0.29 to 0.55 diameters deep at
@@ -55,7 +57,7 @@ def time_step(scene: Scene) -> float:
         # A damper that acts a period late drives vibrations that are faster than the period.
         raise InputError(
             f"fidelity.control_interval_s: {whole:g} s is {steps} time steps, but a servo (motor.law) must damp in "
-            f"each; use at most {wanted:.3g} s, or softer contacts, servos and strings"
+            f"each; use at most {rounded_down(wanted)} s, or softer contacts, servos and strings"
         )
     return whole / steps
 
@@ -63,26 +65,68 @@ def time_step(scene: Scene) -> float:
 def time_steps(scene: Scene) -> tuple[float, ...]:
     """Return the time step [s] of each phase.
 
-    All phases have the step of `time_step`, with one exception. Phases before the first one with motors have the longer
-    step of a scene without motors, since their smarticles are still rigid in the initial shape. Their results are
-    bitwise equal to those of that scene. Smarticles that are welded later keep the barb angles that their motors
+    All phases have the step of `time_step`, with two exceptions. Phases before the first one with motors have the
+    longer step of a scene without motors, since their smarticles are still rigid in the initial shape. Their results
+    are bitwise equal to those of that scene. Smarticles that are welded later keep the barb angles that their motors
     reached, for which the longer step is not known to be stable. In a plane, or if `fidelity.time_step_s` is given,
-    there is no exception. InputError as in `time_step`, or if bars have holes, or if a wall, hook, string or shaking
-    moves too fast for the step of its phase, or the scene cannot end, see `dem.plan.ends`.
+    there is no such exception. The other one are phases whose drive needs a shorter step, see `limiting_spans`.
+
+    InputError as in `time_step`, or if `fidelity.time_step_s` is too long for a drive, or bars have holes, or a wall,
+    hook, string or shaking moves too fast for the step of its phase, or the scene cannot end, see `dem.plan.ends`.
     """
     if holes := scene.sections.holes(scene.fidelity.rows, scene.least_rows):
         raise InputError(holes)
-    count, shortest = len(scene.phases), time_step(scene)
-    first = next((k for k, phase in enumerate(scene.phases) if phase.actuates), count)
-    steps = (shortest,) * count
-    if scene.fidelity.time_step_s is None and scene.plane is None and first < count:
-        whole = scene.recording.series_interval_s
-        stable = engine_kind(scene.engine).stable_step(scene, articulated=False)
-        poured = whole / _steps_in(whole, _fraction(scene) * stable)
-        steps = (poured,) * first + (shortest,) * (count - first)
+    steps = tuple(_resolved(scene, index, step)[0] for index, step in enumerate(_stable_steps(scene)))
     _check_speeds(scene, steps)
     check_ends(scene)
     return steps
+
+
+def limiting_spans(scene: Scene) -> tuple[Span | None, ...]:
+    """Return, for each phase, the span that makes its time step shorter; None where stability decides it."""
+    return tuple(_resolved(scene, index, step)[1] for index, step in enumerate(_stable_steps(scene)))
+
+
+def _stable_steps(scene: Scene) -> tuple[float, ...]:
+    """Return the time step [s] of each phase as stability decides it."""
+    count, shortest = len(scene.phases), time_step(scene)
+    first = next((k for k, phase in enumerate(scene.phases) if phase.actuates), count)
+    if scene.fidelity.time_step_s is not None or scene.plane is not None or first == count:
+        return (shortest,) * count
+    whole = scene.recording.series_interval_s
+    stable = engine_kind(scene.engine).stable_step(scene, articulated=False)
+    poured = whole / _steps_in(whole, _fraction(scene) * stable)
+    return (poured,) * first + (shortest,) * (count - first)
+
+
+def _spans_of(scene: Scene, index: int) -> tuple[Span, ...]:
+    """Return the spans of a phase, and of active bending that goes on from an earlier one, with keys of the scene."""
+    phases, going_on = scene.phases, index
+    while going_on and not (phases[going_on].stills or phases[going_on].bends):
+        going_on -= 1
+    numbers = dict.fromkeys((index, *([going_on] if phases[going_on].bends else [])))
+    return tuple(replace(span, key=f"phases.{k}.{span.key}") for k in numbers for span in phases[k].spans())
+
+
+def _resolved(scene: Scene, index: int, step: float) -> tuple[float, Span | None]:
+    """Return the longest step up to `step` [s] that resolves all spans of a phase, and the span that decides it.
+
+    InputError if `fidelity.time_step_s` is given, and is too long.
+    """
+    given, phase, limit = scene.fidelity.time_step_s, scene.phases[index], None
+    for span in sorted(_spans_of(scene, index), key=lambda span: span.whole):
+        if span.longest_step < step * (1 - SAME):
+            if given is not None:
+                raise InputError(
+                    f"fidelity.time_step_s: {given:g} s makes {span.seconds / step:.3g} time steps in the "
+                    f"{span.seconds:.3g} s of {span.key} ({span.value}), and {span.steps} resolve it; use at most "
+                    f"{0.995 * span.longest_step:.3g} s or leave it out"
+                )
+            interval = scene.fidelity.control_interval_s if phase.actuates else scene.recording.series_interval_s
+            step, limit = interval / _steps_in(interval, span.longest_step), span
+        if span.whole and (divided := span.divided(step)) < step * (1 - SAME):
+            step, limit = divided, span
+    return step, limit
 
 
 def _fraction(scene: Scene) -> float:

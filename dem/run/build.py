@@ -132,6 +132,8 @@ def build_watchdog(scene: Scene) -> Watchdog:
         cylinder=scene.cylinder,
         speed=max(SPEED_MARGIN, math.sqrt(max(masses) / min(masses))) * max(fall, fastest, speed_by_overlap(scene)),
         way_out=DAMP_SHAFTS if _rings(scene) else LOWER_STEP,
+        floats=scene.mixture is not None
+        and any(kind.filament is not None and kind.filament.weight_share < 0 for kind in scene.mixture.kinds),
         gap=(PIN_LIMIT if scene.mixture is not None and scene.mixture.jointed else GAP_LIMIT) * diameter,
         depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,
         pressed=PRESSED * diameter if scene.smooth else math.inf,

@@ -28,6 +28,7 @@ class Watchdog:
     cylinder: Cylinder
     speed: float  #: Largest speed of a link's centre [m/s]; falls, shaking and motors of the scene cause lower speeds
     way_out: str = LOWER_STEP  #: Advice where a speed is larger
+    floats: bool = False  #: Whether bodies are lighter than the liquid around them, so that they rise without end
     gap: float = math.inf  #: Largest gap of a hinge [m]; beyond it the hinge is broken
     depth: float = math.inf  #: Largest overlap [m]; beyond it contacts no longer keep bodies apart
     pressed: float = math.inf  #: Overlap [m] above which a run warns at its end: bodies stay apart, but are too soft
@@ -106,12 +107,11 @@ class Watchdog:
             out = (heights > height + raised) | (beyond.any(axis=1) & (above > height).any(axis=1))
             outside |= beyond & ~out[:, None]
         reject(outside.any(axis=1), time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
-        reject(
-            out,
-            time,
-            f"thrown out over the wall of {self.cylinder.height:.3g} m",
-            "raise container.height_m, or shake or throw less",
-        )
+        cause, way_out = "thrown out", "raise container.height_m, or shake or throw less"
+        if self.floats:
+            cause = "lighter than the liquid, which has no surface, and risen"
+            way_out = "raise particle.density_kg_per_m3 above liquid.density_kg_per_m3, or end the run earlier"
+        reject(out, time, f"{cause} over the wall of {self.cylinder.height:.3g} m", way_out)
 
     def check_depths(self, overlaps: Overlaps, *, time: float) -> None:
         """Check the overlaps of all contacts at a simulated time [s]; raise RunError beyond `depth`."""

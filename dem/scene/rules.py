@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from dem.errors import rounded_up
 from dem.phases.kinds import KINDS
 from dem.phases.phase import Phase, SceneView
 from dem.phases.place import Place
@@ -41,11 +42,23 @@ def problems(scene: SceneView, engine: str) -> Iterator[str]:
         yield from phase.check(scene, index)
         if phase.vibrated_by is not None:
             yield from check_shaking(scene, f"phases.{index}.vibration", phase.vibrated_by)
+            yield from _of_windows(index, phase)
     if scene.hooks is not None:
         yield from _of_bars(scene.hooks)
         yield from _of_room(scene, scene.hooks)
     if engine == "lammps":
         yield from _of_lammps(scene)
+
+
+def _of_windows(index: int, phase: Phase) -> Iterator[str]:
+    """Yield an error for a window of a vibration that begins when its phase is over."""
+    windows, length = phase.vibrated_by.windows_s if phase.vibrated_by else None, phase.known_duration
+    for number, (on, off) in enumerate(windows or ()):
+        if length is not None and on >= length:
+            yield (
+                f"phases.{index}.vibration.windows_s.{number}: [{on:g}, {off:g}] s begins after the end of the phase, "
+                f"which takes {length:.6g} s; leave it out, or lengthen the phase"
+            )
 
 
 def _of_order(scene: SceneView) -> Iterator[str]:
@@ -104,6 +117,7 @@ def _of_bending(scene: SceneView, engine: str) -> Iterator[str]:
             )
     if shapes == {""}:
         return
+    yield from _of_floating(scene)
     bent = max(shapes)
     if engine == "yade" and bent == "filament":
         yield from _of_nodes(scene)
@@ -116,6 +130,19 @@ def _of_bending(scene: SceneView, engine: str) -> Iterator[str]:
     for index, phase in enumerate(scene.phases):
         if phase.kind == "take-over":
             yield f"phases.{index}: take-over reads runs of rigid bodies only; use 'deposit', or 'place' with a frame"
+
+
+def _of_floating(scene: SceneView) -> Iterator[str]:
+    """Yield an error for filaments that are poured but do not sink in their liquid."""
+    if scene.mixture is None or scene.liquid is None or not scene.phases[0].pours:
+        return
+    for filament in (kind.filament for kind in scene.mixture.kinds):
+        if filament is not None and filament.weight_share <= 0:
+            yield (
+                f"particle.density_kg_per_m3: {filament.density:g} kg/m³ is no more than liquid.density_kg_per_m3 = "
+                f"{scene.liquid.density_kg_per_m3:g} kg/m³, so that filaments do not sink and nothing comes down in "
+                "phases.0; use a higher density or a lower one of the liquid, or start with 'place'"
+            )
 
 
 def _of_nodes(scene: SceneView) -> Iterator[str]:
@@ -159,7 +186,8 @@ def _of_body(scene: SceneView) -> Iterator[str]:
     if particle.boxes.bulge and 0 < particle.boxes.barb_length < least:
         yield (
             f"{key} leaves no room for a sphere of barbs that reach {particle.boxes.barb_length:.4g} m from the hinge; "
-            f"use barbs of at least {least:.4g} m (aspect_ratio {least / particle.boxes.middle_length:.3g}), or a "
+            f"use barbs of at least {rounded_up(least, 4)} m (aspect_ratio "
+            f"{rounded_up(least / particle.boxes.middle_length)}), or a "
             "thinner middle link"
         )
 
@@ -175,7 +203,7 @@ def _of_container(scene: SceneView) -> Iterator[str]:
         if reach > inner and not isinstance(scene.phases[0], Place):  # which checks the poses themselves
             yield (
                 f"container.{key}: {inner:g} m is narrower than {body}, whose farthest point is {reach:.4g} m "
-                f"from its centre of mass; use at least {reach:.4g} m"
+                f"from its centre of mass; use at least {rounded_up(reach, 4)} m"
             )
     height = scene.container.height_m
     if height is not None:

@@ -301,8 +301,9 @@ class Scene(Part, Shown):
             ratio = _usual_torque(self.smarticle, gravity) / _usual_torque(paper, EARTH_GRAVITY)
             vars(self)["motor"] = _scaled(self.motor, "stiffness_N_m_per_rad", ratio)
         root = math.sqrt(gravity * _sizes(dict(self))[0] / (EARTH_GRAVITY * paper.middle_length_m))
+        longer = root * EARTH_GRAVITY / gravity  # times go with √(w/g)
         vars(self)["phases"] = tuple(
-            _filled(phase, settle=_scaled(phase.settle, "speed_m_per_s", root))
+            _filled(phase, settle=_scaled(_scaled(phase.settle, "speed_m_per_s", root), "hold_s", max(1.0, longer)))
             if isinstance(phase, Deposit | TakeOver)
             else phase
             for phase in self.phases

@@ -93,6 +93,11 @@ class SimpleMotion(BaseMotion):
         """
         raise NotImplementedError
 
+    @property
+    def changes_in(self) -> float:
+        """Time within which the angle changes, a period or a turn [s]; inf where it stays."""
+        raise NotImplementedError
+
     def legs(self, start: Array, home: Array, until: float) -> Iterator[Leg]:
         yield Leg("", self, start, home, until)
 
@@ -112,6 +117,10 @@ class Hold(_Endless):
 
     type: Literal["hold"]
 
+    @property
+    def changes_in(self) -> float:
+        return math.inf
+
     def course(self, start: Array, home: Array) -> Course:
         return lambda times: start
 
@@ -126,6 +135,10 @@ class _Straight(SimpleMotion):
 
     @property
     def duration(self) -> float:
+        return self.duration_s
+
+    @property
+    def changes_in(self) -> float:
         return self.duration_s
 
     def goal(self, home: Array) -> Array:
@@ -188,6 +201,10 @@ class _Wave(_Endless):
     @property
     def period(self) -> float:
         return 1 / self.frequency
+
+    @property
+    def changes_in(self) -> float:
+        return self.period
 
     @property
     def fastest(self) -> float:

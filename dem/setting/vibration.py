@@ -1,11 +1,13 @@
 """Vibration of the container during a test of the pile: key `vibration` of a phase."""
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from dem.setting.part import Part
+from dem.setting.span import Span
 
 ShakingFrequency = Annotated[float, Field(ge=0.01, le=2000)]  # Hz
 PeakAcceleration = Annotated[float, Field(ge=0, le=100)]  # g
@@ -51,6 +53,18 @@ class Vibration(Part):
     def peak_speed(self, gravity: float) -> float:
         """Return the greatest speed [m/s]; gravity in m/s²."""
         return self.amplitude(gravity) * 2 * math.pi * self.frequency_hz
+
+    def spans(self, prefix: str) -> Iterator[Span]:
+        """Yield its period, its windows and the times between them; `prefix` is put before their keys."""
+        if self.peak_acceleration_g:
+            frequency = self.frequency_hz
+            yield Span(key=f"{prefix}frequency_hz", value=f"{frequency:g} Hz", seconds=1 / frequency)
+        last = 0.0
+        for number, (on, off) in enumerate(self.windows_s or ()):
+            for seconds in (on - last, off - on):
+                if seconds > 0:
+                    yield Span(key=f"{prefix}windows_s.{number}", value=f"[{on:g}, {off:g}] s", seconds=seconds)
+            last = off
 
     def next_switch(self, elapsed: float) -> tuple[bool, float]:
         """Return whether it vibrates at a time of the phase [s], and the time of the next change [s]."""

@@ -220,3 +220,26 @@ def test_friction_acts_on_the_surfaces_of_bars_of_unequal_thickness(
     np.testing.assert_allclose(turned / pushed, arms, rtol=5e-3)  # the depth changes by less
     heights = engine.contact_forces().points[:, 2] - engine.state().positions[1, 2]
     np.testing.assert_allclose(heights, radii[1] - depth / 2, rtol=1e-3)
+
+
+@pytest.mark.parametrize("name", ["ring", "star"])
+def test_energy_and_forces_of_bodies_in_each_other_do_not_depend_on_their_numbers(name: str) -> None:
+    count, dt = 8, 1e-13  # so short a step that no body moves
+    scene = scene_of(name, count=count, **{"container.radius_m": 0.05})
+    found = []
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        places = rng.uniform(-8e-3, 8e-3, (count, 3)) + np.array([0, 0, 0.05])
+        turns = Rotation.random(count, random_state=seed)
+        energies, pushed = [], []
+        for order in (np.arange(count), np.arange(count)[::-1], rng.permutation(count)):
+            engine = build_engine(scene, dt)
+            engine.add(Poses(places[order], tuple(turns[k] for k in order), np.zeros(count, np.int64)))
+            engine.advance(1)
+            energies.append(engine.ledger.elastic()[0])
+            pushed.append(engine.state().velocities[np.argsort(order)])
+        assert energies == pytest.approx([energies[0]] * 3, rel=1e-12, abs=0)
+        for velocities in pushed[1:]:
+            np.testing.assert_allclose(velocities, pushed[0], rtol=0, atol=1e-9 * np.abs(pushed[0]).max())
+        found.append(energies[0])
+    assert min(found) > 1e-6  # they overlap, by tenths of a diameter

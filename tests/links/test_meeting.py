@@ -10,8 +10,10 @@ from scipy.spatial.transform import Rotation
 from dem.engine.links import vectors
 from dem.engine.links.contact import boundaries, meeting
 from dem.engine.links.contact.meeting import COLUMNS, ENERGY, POINTS, ROWS
+from dem.engine.links.shapes import EITHER_ORDER
 
 D, KN = 1.127e-3, 500.0
+EITHER = EITHER_ORDER
 between, lines, nearest, nearest_to_circle, meet, meets_elsewhere = (
     builds.callable_from_python(part)
     for part in (
@@ -97,7 +99,7 @@ def touching(rng: np.random.Generator, angle: float) -> tuple[np.ndarray, np.nda
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.01, 0.05, 0.2, 1.0, math.pi / 2, 3.1])
-@pytest.mark.parametrize("joints", [(0, 0), (1, 0), (1, 1), (2, 3)])
+@pytest.mark.parametrize("joints", [(0, 0), (1, 0), (1, 1), (2, 3), (EITHER, EITHER), (2 | EITHER, 3 | EITHER)])
 def test_forces_are_derivatives_of_the_energy(angle: float, joints: tuple[int, int]) -> None:
     rng = np.random.default_rng(int(100 * angle))
     step, scale = 1e-10, KN * 0.1 * D
@@ -179,7 +181,7 @@ def test_what_is_left_out_of_a_lone_contact_is_nothing() -> None:
         # At a hinge, at an end, anywhere; so near that they touch.
         s, t = rng.choice([0.0, 1.0, rng.uniform()]), rng.choice([0.0, 1.0, rng.uniform()])
         q[:3] = p[:3] + s * p[3:] - t * q[3:] + 0.4 * D * rng.normal(size=3)
-        joints = int(rng.integers(2)), int(rng.integers(2))
+        joints = int(rng.integers(2)) | EITHER * (k % 3 == 0), int(rng.integers(2)) | EITHER * (k % 3 == 0)
         rows = meet(line(p), line(q), KN, *joints, out)
         if not rows:
             continue
@@ -188,3 +190,25 @@ def test_what_is_left_out_of_a_lone_contact_is_nothing() -> None:
         assert alone == (rows == 1 and not out[1:POINTS, 8].any()), (k, joints)
         kinds[alone] += 1
     assert min(kinds.values()) > 500
+
+
+@pytest.mark.parametrize("joints", [(0, 0), (1, 2), (3, 3)])
+@pytest.mark.parametrize("angle", [0.0, 0.1, 0.3, 1.0])
+def test_energy_and_forces_do_not_depend_on_the_order_of_the_segments(angle: float, joints: tuple[int, int]) -> None:
+    rng, scale, differ = np.random.default_rng(int(10 * angle)), KN * D, 0
+    first, second = (each | EITHER for each in joints)
+    for _ in range(300):
+        lengths = rng.uniform(0.5 * D, 4 * D, size=2)
+        q = np.array([*rng.normal(size=2) * D, D * rng.uniform(0.4, 1.0), *lengths[1] * np.array([1, angle, 0.1])])
+        p = np.array([0.0, 0.0, 0.0, lengths[0], 0.0, 0.0])
+        energy, force, torque, count = look(p, q, (first, second))
+        back = look(q, p, (second, first))
+        assert back[0] == pytest.approx(energy, abs=1e-12 * scale * D)
+        np.testing.assert_allclose(back[1], -force, rtol=0, atol=1e-9 * scale)
+        np.testing.assert_allclose(back[2], -torque, rtol=0, atol=1e-9 * scale * D)
+        assert back[3] >= min(count, 1)
+        # The mean is that of the energies of both orders, which differ.
+        orders = look(p, q, joints)[0], look(q, p, joints[::-1])[0]
+        assert energy == pytest.approx(sum(orders) / 2, abs=1e-12 * scale * D)
+        differ += not math.isclose(*orders, rel_tol=1e-6, abs_tol=1e-12 * scale * D)
+    assert differ > 20

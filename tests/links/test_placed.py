@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scenes import SMALL, changed
 from stopping import assert_goes_on
 
+from dem.errors import RunError
 from dem.record.run import Run
 from dem.run.build import build_engine
 from dem.run.run import run_scene
@@ -282,3 +283,13 @@ def test_two_bodies_hooked_into_each_other_are_pulled_apart_by_number(tmp_path: 
     assert (series["grip_fixed_count"][held] == 1).all()
     assert (series["grip_moved_count"][held] == 1).all()
     assert series["elongation_m"][held][-1] == pytest.approx(0.003, rel=0.1)
+
+
+def test_a_filament_that_is_lighter_than_its_liquid_rises_and_leaves_over_the_wall(tmp_path: Path) -> None:
+    light = {**WORM, "density_kg_per_m3": 900, "young_modulus_Pa": 2e4}
+    points = zigzag(12, 0.0025, angle=0.1)
+    made = scene(tmp_path, [points], {"type": "relax", "duration_s": 1.0}, particle=light, liquid={})
+    with pytest.raises(
+        RunError, match=r"lighter than the liquid, .* risen over the wall of 0\.06 m; raise particle\.d"
+    ):
+        run_scene(made, tmp_path / "run", command="")

@@ -74,7 +74,7 @@ class Segments(NamedTuple):
     begin: Indices  #: (N + 1,) number of the first segment of each body, then Q
     body: Indices  #: (Q,) number of the body to which each segment belongs
     part: Indices  #: (Q,) number of the part with which each segment moves
-    shared: NDArray[np.uint8]  #: (Q,) ends that another segment owns, as bits `shapes.AT_START` and `AT_END`
+    shared: NDArray[np.uint8]  #: (Q,) ends that another segment owns, and `EITHER_ORDER`: bits, see `shapes.AT_START`
     first: Indices  #: (L + 1,) number of the first segment of each link, then Q
     bends: Any  #: `Bends`; None where no body is flexible
 

@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 # Columns of a segment: start of its axis and vector to its end [m], inverse squared length [1/m²], radius [m].
 START, VECTOR, INVERSE, RADIUS, LINE = 0, 3, 6, 7, 8
 AT_START, AT_END = 1, 2  # bits: the segment starts, or ends, at a joint that another segment of the body owns
+# Bit: the energy of two such segments is the mean over both orders of them, see `contact.meeting`. Bars of smarticles
+# are so long that the order makes no difference to most of their contacts; they, filaments and chains do without.
+EITHER_ORDER = 4
 
 
 class Planar(NamedTuple):
@@ -58,7 +61,7 @@ class Shape:
     inertia: Array
     lines: Array  #: (M, LINE) segments, link by link; for the columns see `START`
     link: NDArray[np.int64]  #: (M,) link of each segment; for a smarticle 0 barb 1, 1 middle link, 2 barb 2
-    shared: NDArray[np.uint8]  #: (M,) ends that another segment owns, as bits `AT_START` and `AT_END`
+    shared: NDArray[np.uint8]  #: (M,) ends that another segment owns, `AT_START` and `AT_END`; or `EITHER_ORDER`
     effective_mass: float  #: Harmonic mean of the effective mass over points and directions [kg]; damping depends on it
     planar: Planar | None = None  #: Geometry of a smarticle; None for other bodies
     filament: Filament | None = None  #: Kind of filament of a flexible body; None for other bodies
@@ -165,8 +168,10 @@ def kind_shape(kind: Kind) -> Shape:
         return filament_shape(kind.filament)
     shape = rigid_shape(kind.bars, kind.rows, kind.radius)
     shape = replace(shape, effective_mass=typical_effective_mass(kind), linkage=kind.linkage)
-    # Links of a linkage that fold touch each other but for neighbours: none owns the joint where a third one touches.
-    return shape if kind.linkage is None else replace(shape, shared=np.zeros_like(shape.shared))
+    if kind.linkage is not None:
+        # Links that fold touch each other but for neighbours: none owns the joint where a third one touches.
+        return replace(shape, shared=np.zeros_like(shape.shared))
+    return replace(shape, shared=shape.shared | np.uint8(EITHER_ORDER))
 
 
 def link_shapes(kind: Kind) -> list[Shape]:

@@ -139,6 +139,15 @@ def lines(p: Array, q: Array) -> Lines:
 
 
 @inlined
+def exchanged(both: Lines) -> Lines:
+    """Return two segments in the other order."""
+    return Lines(
+        both.q, both.p, both.v, both.u, scale(-1.0, both.w), both.c, both.b, both.a, -both.e, -both.d, both.inverse_c,
+        both.inverse_a,
+    )  # fmt: skip
+
+
+@inlined
 def between(both: Lines, s: float, t: float) -> Vector:
     """Return the vector from the point q + t v of the second segment to p + s u of the first [m]."""
     return sub(along(both.w, s, both.u), scale(t, both.v))

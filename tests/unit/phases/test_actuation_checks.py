@@ -77,6 +77,33 @@ def test_crossing_barbs(scene_data: SceneData) -> None:
     assert rejected(scene_data, turns, smarticle__aspect_ratio=2, container__radius_m=0.05) == message
 
 
+@pytest.mark.parametrize(
+    ("barbs", "key", "unresolved"),
+    [
+        ({**SINE, "amplitude_deg": 1e-3, "frequency_hz": 500}, "frequency_hz", "a sine of 0.002 s has 10"),
+        (
+            {"type": "triangle", "centre_deg": 90, "amplitude_deg": 0.1, "speed_rad_per_s": 5.8},
+            "speed_rad_per_s",
+            "a triangle of 0.0012 s has 6.02",
+        ),
+        (sequence({"type": "ramp", "to_deg": 89.9, "duration_s": 1e-3}, {"type": "hold"}), "steps.0.duration_s",
+         "a ramp of 0.001 s has 5"),
+    ],
+)  # fmt: skip
+def test_motions_that_control_updates_do_not_resolve(
+    scene_data: SceneData, barbs: dict[str, Any], key: str, unresolved: str
+) -> None:
+    phase = actuate(barbs, duration_s=0.1)
+    error = rejected(scene_data, phase)
+    assert error.startswith(f"phases.1.barbs.{key}: {unresolved} control updates, 20 resolve it; use a slower one, or")
+    offered = error.removesuffix(" s").rpartition(" ")[2]
+    checked(scene_data, phase, fidelity={"control_interval_s": float(offered)})
+
+
+def test_a_swing_of_a_tiny_angle_is_too_fast_for_control_updates(scene_data: SceneData) -> None:
+    assert rejected(scene_data, {**OSCILLATION, "theta_deg": 0.1}).startswith("phases.1.theta_deg: a triangle of")
+
+
 NARROW = {"rows": 1, "diameter_m": 1.17e-3}  # ten diameters along the middle link
 
 

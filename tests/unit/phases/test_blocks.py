@@ -319,6 +319,12 @@ def test_new_keys_at_their_defaults_change_no_hash() -> None:
             "or moves: container",
         ),
         (
+            [{**TENSION, "vibration": {"peak_acceleration_g": 1, "windows_s": [[0.1, 0.2], [0.4, 0.5]]}}],
+            {},
+            "phases.1.vibration.windows_s.1: [0.4, 0.5] s begins after the end of the phase, which takes 0.4 s",
+            "lengthen",
+        ),
+        (
             [{"type": "pull-hook", "vibration": {"peak_acceleration_g": 2}}],
             {"hooks": {}, "engine": "yade"},
             "phases.1 (pull-hook): vibration",
@@ -350,3 +356,18 @@ def test_allowed_blocks_after_the_wall_has_gone() -> None:
 
 def test_what_a_lift_holds_is_free_after_a_tension() -> None:
     with_phase(LIFT, TENSION, COMPRESS, {"type": "shape-change"})
+
+
+@pytest.mark.parametrize("phase", ["lift", "pull-hook", "tension", "shake"])
+def test_the_least_duration_that_a_message_names_is_accepted(phase: str) -> None:
+    rng = np.random.default_rng(3)
+    for distance, speed in rng.uniform(0.005, 0.1, (30, 2)).round(4).tolist():
+        keys = {"distance_m": distance, "speed_m_per_s": speed}
+        if phase == "shake":
+            keys = {"taps": 3, "frequency_hz": 1000 * speed, "rest_s": distance}
+        elif phase == "tension":
+            keys["grip_m"] = 0.001
+        with pytest.raises(InputError) as caught:
+            with_phase({"type": phase, **keys, "duration_s": 0.01}, hooks={})
+        least = str(caught.value).partition("use at least ")[2].partition(" s")[0]
+        with_phase({"type": phase, **keys, "duration_s": float(least)}, hooks={})

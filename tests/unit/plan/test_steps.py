@@ -8,10 +8,25 @@ import pytest
 from scenes import chain, small
 
 from dem.errors import InputError
-from dem.plan.steps import MOST_PER_STEP, stable_step, time_step, time_steps
+from dem.plan.outlook import plan
+from dem.plan.steps import MOST_PER_STEP, limiting_spans, stable_step, time_step, time_steps
 from dem.scene.scene import Scene
 
 DEPOSIT = {"type": "deposit"}
+COARSE = {"fidelity": {"base": "draft", "stiffness_N_per_m": 20}}  # a stable step of 0.2 ms and more
+WORM = {"shape": "filament", "length_m": 0.03, "diameter_m": 0.8e-3, "segments": 6, "young_modulus_Pa": 2e4}
+MOTOR = {
+    **{"law": "motor", "torque_limit_N_m": 2e-4, "stiffness_N_m_per_rad": 1e-3, "damping_N_m_s_per_rad": 2e-7},
+    **{"speed_limit_rad_per_s": 30},
+}
+LINKS = {"shape": "chain", "link_m": [0.006, 0.005], "diameter_m": 1.5e-3, "joints": [MOTOR]}
+WORMS: dict[str, Any] = {
+    **{"engine": "links", "particle": WORM, "liquid": {}, "count": 2},
+    **{"fidelity": {"base": "draft", "stiffness_N_per_m": 10}},
+}
+CHAINS: dict[str, Any] = {"engine": "links", "particle": LINKS, "count": 2}
+VIBRATED = {"type": "compress", "speed_m_per_s": 0.01}
+HELD = {"type": "lift", "duration_s": 0.1, "speed_m_per_s": 0.1}
 
 
 def rejection(scene: Scene) -> str:
@@ -124,3 +139,115 @@ def test_steps_on_links_are_half_as_long_where_impacts_lose_nothing(engine: str,
     assert relative_step(0.95) / relative_step(0.96) == pytest.approx(shorter, rel=0.01)
     given = {"engine": engine, "contact.restitution": 1, "fidelity": {"base": "draft", "time_step_s": 2e-5}}
     assert time_step(small(given)) == pytest.approx(2e-5)
+
+
+# -- drives ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("phase", "more", "seconds"),
+    [
+        ({"type": "shake", "frequency_hz": 1900}, {**COARSE, "engine": "yade"}, 1 / 1900),
+        ({"type": "shake", "frequency_hz": 1900}, {**COARSE, "engine": "lammps"}, 1 / 1900),
+        ({"type": "shake", "frequency_hz": 1900}, {"engine": "links"}, 1 / 1900),
+        (
+            {**VIBRATED, "vibration": {"peak_acceleration_g": 1, "frequency_hz": 1900}},
+            {"engine": "links"},
+            1 / 1900,
+        ),
+        (
+            {**VIBRATED, "vibration": {"peak_acceleration_g": 1, "windows_s": [[0, 0.1], [0.1003, 0.2]]}},
+            {"engine": "links"},
+            0.0003,
+        ),
+        ({"type": "wriggle", "duration_s": 0.1, "curvature_per_m": 100, "frequency_hz": 9000}, WORMS, 1 / 9000),
+        ({"type": "wriggle", "duration_s": 0.1, "curvature_per_m": 100, "ramp_s": 5e-4}, WORMS, 5e-4),
+        ({"type": "undulate", "duration_s": 0.1, "amplitude_deg": 0.02, "frequency_hz": 9000}, CHAINS, 1 / 9000),
+        (
+            {
+                **{"type": "undulate", "duration_s": 0.1, "frequency_hz": 9000},
+                **{"joints": [{"joint": 0, "amplitude_deg": 0.02}]},
+            },
+            CHAINS,
+            1 / 9000,
+        ),
+        ({**HELD, "distance_m": 2e-5}, {"engine": "links"}, 2e-4),
+        (
+            {"type": "pull-hook", "duration_s": 0.1, "speed_m_per_s": 0.1, "distance_m": 2e-5},
+            {"engine": "links", "hooks": {}},
+            2e-4,
+        ),
+        (
+            {"type": "tension", "grip_m": 1e-3, **HELD, "distance_m": 2e-5} | {"type": "tension"},
+            {"engine": "links"},
+            2e-4,
+        ),
+    ],
+)
+def test_every_drive_has_twenty_steps_in_its_shortest_time_or_is_rejected(
+    phase: dict[str, Any], more: dict[str, Any], seconds: float
+) -> None:
+    scene = small({"phases": [DEPOSIT, phase], **more})
+    before, driven = time_steps(scene)
+    assert before == time_step(scene) > seconds / 20  # stability alone does not resolve it
+    assert 0.9 * seconds / 20 < driven <= seconds / 20 * (1 + 1e-9)
+    whole = scene.recording.series_interval_s / driven
+    assert whole == pytest.approx(round(whole), abs=1e-9)
+    (limit,) = [span for span in limiting_spans(scene) if span is not None]
+    assert limit.seconds == pytest.approx(seconds)
+    planned = plan(scene)
+    assert f"phase 1: {driven:.3g} s, as {limit.key} ({limit.value}) needs" in planned.to_text()
+    assert planned.time_step_s == driven
+    # With a step of one's own there is no other.
+    fidelity = {**dict(more.get("fidelity", {"base": "draft"})), "time_step_s": before}
+    changes = {"phases": [DEPOSIT, phase], **more, "fidelity": fidelity}
+    error = rejection(small(changes))
+    assert f"fidelity.time_step_s: {before:g} s makes {seconds / before:.3g} time steps in the" in error
+    assert limit.key.startswith("phases.1.")
+    assert limit.key in error
+    assert limit.value in error
+    offered = re.search(r"use at most (\S+) s or leave it out", error)
+    assert offered is not None
+    changes["fidelity"] = {**fidelity, "time_step_s": float(offered[1])}
+    assert time_steps(small(changes))[1] <= seconds / 20 * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("phase", "more"),
+    [
+        ({"type": "shake", "frequency_hz": 30}, {"engine": "links"}),
+        ({"type": "shake", "frequency_hz": 1900, "peak_acceleration_g": 0}, {"engine": "links"}),
+        ({"type": "wriggle", "duration_s": 0.1, "curvature_per_m": 0, "frequency_hz": 9000}, WORMS),
+        ({"type": "undulate", "duration_s": 0.1, "frequency_hz": 9000, "ramp_s": 0}, CHAINS),
+        ({**HELD, "distance_m": 0}, {"engine": "links"}),
+    ],
+)
+def test_what_is_slow_or_does_not_move_leaves_the_step(phase: dict[str, Any], more: dict[str, Any]) -> None:
+    scene = small({"phases": [DEPOSIT, phase], **more})
+    assert time_steps(scene) == (time_step(scene),) * 2
+    assert limiting_spans(scene) == (None, None)
+
+
+def test_bending_that_goes_on_keeps_its_step_until_another_phase_ends_it() -> None:
+    fast = {"type": "wriggle", "duration_s": 0.1, "curvature_per_m": 100, "frequency_hz": 9000}
+    lift = {"type": "lift", "distance_m": 0.003, "speed_m_per_s": 0.03}
+    for end in ({"type": "relax"}, {**fast, "frequency_hz": 1}):
+        steps = time_steps(small({"phases": [DEPOSIT, fast, lift, {"type": "release"}, end], **WORMS}))
+        assert steps[0] == steps[4] > steps[1] == steps[2] == steps[3]
+
+
+@pytest.mark.parametrize("engine", ["yade", "lammps", "links"])
+@pytest.mark.parametrize("frequency", [31.0, 700.0])
+def test_cycles_of_taps_are_whole_and_those_that_vary_are_nearly_so(engine: str, frequency: float) -> None:
+    def tapped(**more: Any) -> float:
+        phase = {"type": "shake", "taps": 2, "frequency_hz": frequency, "peak_acceleration_g": 2, **more}
+        return time_steps(
+            small({"phases": [DEPOSIT, phase], "engine": engine, **({} if engine == "links" else COARSE)})
+        )[1]
+
+    for step in (tapped(), tapped(peak_acceleration_end_g=1)):
+        steps = 1 / frequency / step
+        assert steps >= 20 * (1 - 1e-9)
+        assert steps == pytest.approx(round(steps), abs=1e-6)
+    # Taps of other lengths are each rounded by half a step at most, 0.25 %.
+    assert tapped(frequency_end_hz=1.2 * frequency) <= 2.5e-3 / (1.2 * frequency) / 0.5 * (1 + 1e-9)

@@ -149,6 +149,25 @@ def test_shafts_and_the_speed_of_a_settled_pile_follow_the_size_of_the_body(
     assert scene_hash(again) == scene_hash(scene)
 
 
+@pytest.mark.parametrize(
+    ("changes", "hold"),
+    [
+        ({}, 0.05),
+        ({"gravity_m_per_s2": 9.81 / 4}, 0.1),
+        ({"gravity_m_per_s2": 4 * 9.81}, 0.05),  # shorter times are between two checks
+        ({"particle": {"shape": "rod", "length_m": 0.0468, "diameter_m": 1e-3}, "container.radius_m": 0.05}, 0.1),
+        ({"particle": {"shape": "rod", "length_m": 0.002, "diameter_m": 1e-4}}, 0.05),
+        ({"gravity_m_per_s2": 1, "phases.0.settle.hold_s": 0.02}, 0.02),
+    ],
+)
+def test_a_pile_of_large_bodies_must_be_still_for_longer(changes: dict[str, Any], hold: float) -> None:
+    scene = small(changes)
+    assert scene.phases[0].settle.hold_s == hold
+    again = parse_scene(yaml.safe_load(dump_scene(scene)), source="dump")
+    assert again.phases == scene.phases
+    assert scene_hash(again) == scene_hash(scene)
+
+
 def test_scaled_defaults_do_not_count_as_given_so_that_a_changed_scene_scales_anew() -> None:
     scene = small({"motor.law": "stall", "gravity_m_per_s2": 1})
     kept = scene.model_dump(exclude_unset=True)

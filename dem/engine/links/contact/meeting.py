@@ -22,6 +22,10 @@ with u_h from the overlap between the joint and the other segment. If joints of 
 is subtracted for each joint, and the energy between both joints is added. The rest of E goes to zero as the point of
 contact moves to the joint, so that a bend is as stiff as a straight bar. Forces from f_ℓ and from joints are bare
 forces: they have no friction and no dashpot.
+
+ℓ is a length along the first link, and of tilted links each has its own ends of the stretch. E therefore depends on the
+order of the links if ℓ is less than a diameter, or if they overlap deeply. Where the bit `EITHER_ORDER` of both is set,
+E is the mean over both orders.
 """
 
 from __future__ import annotations
@@ -31,7 +35,7 @@ import math
 from dem.engine.links.arrays import Array
 from dem.engine.links.compiler import inlined, part
 from dem.engine.links.contact.barrier import stretch
-from dem.engine.links.shapes import AT_END, AT_START, RADIUS
+from dem.engine.links.shapes import AT_END, AT_START, EITHER_ORDER, RADIUS
 from dem.engine.links.vectors import (
     Lines,
     Vector,
@@ -40,6 +44,7 @@ from dem.engine.links.vectors import (
     between,
     clamp,
     dot,
+    exchanged,
     lines,
     nearest,
     put,
@@ -50,10 +55,13 @@ from dem.engine.links.vectors import (
 )  # fmt: skip
 
 # Rows that `meet` writes: three points of contact, half way between the axes, then bare forces: forces without friction
-# and dashpot.
-POINTS, BARE = 3, 10
+# and dashpot. In one order of the segments there are up to 10 bare forces, in both together two more where ends of the
+# stretch differ.
+POINTS, BARE = 3, 22
 ENERGY = POINTS + BARE  # row whose first number is E
-ROWS = ENERGY + 1
+IN_ORDER = ENERGY + 1  # number of rows of one order; those of the other one follow
+ROWS = 2 * IN_ORDER
+SAME = 1e-9  # distance of two points of contact, in diameters, below which they are one
 # Columns of a point of contact: position [m], normal from the second link to the first [1], load of the normal spring
 # [N], the part of the load that friction and dashpot follow [N], fraction of a full contact's springs and dashpots that
 # acts here [1] (0: no contact), hardening of the dashpot [1], distance of the axes [m]. Of a bare force: position [m],
@@ -89,6 +97,55 @@ def meet(p: Array, q: Array, stiffness: float, shared_p: int, shared_q: int, out
 
 @inlined
 def meet_at(
+    both: Lines, s: float, t: float, gap: Vector, distance: float, diameter: float, stiffness: float,
+    shared_p: int, shared_q: int, out: Array,
+) -> int:  # fmt: skip
+    """Find the points of contact of two segments that touch, and the forces there, as `_meet_in_order` does."""
+    if shared_p & shared_q & EITHER_ORDER:
+        return _meet_in_either(both, s, t, gap, distance, diameter, stiffness, shared_p, shared_q, out)
+    return _meet_in_order(both, s, t, gap, distance, diameter, stiffness, shared_p, shared_q, out)
+
+
+@part
+def _meet_in_either(
+    both: Lines, s: float, t: float, gap: Vector, distance: float, diameter: float, stiffness: float,
+    shared_p: int, shared_q: int, out: Array,
+) -> int:  # fmt: skip
+    """Find points and forces by the mean of the energies of both orders of the segments; see `_meet_in_order`."""
+    half, other = 0.5 * stiffness, out[IN_ORDER:]
+    bare = _meet_in_order(both, s, t, gap, distance, diameter, half, shared_p, shared_q, out)
+    back = scale(-1.0, gap)
+    more = _meet_in_order(exchanged(both), t, s, back, distance, diameter, half, shared_q, shared_p, other)
+    out[ENERGY, 0] += other[ENERGY, 0]
+    for k in range(POINTS):
+        out[k, SHARE] *= 0.5
+    for k in range(POINTS):
+        row = other[k]
+        if row[SHARE] <= 0.0:
+            continue
+        place, best, least = vector(row, PLACE), 0, math.inf
+        for slot in range(POINTS):
+            away = square(sub(vector(out[slot], PLACE), place))
+            if out[slot, SHARE] > 0.0 and away < least:
+                best, least = slot, away
+        # Friction and dashpots of a point that one order alone has go with the nearest point.
+        out[best, CARRIED] += row[CARRIED]
+        if least <= (SAME * diameter) ** 2:
+            out[best, SHARE] += 0.5 * row[SHARE]
+            out[best, LOAD] += row[LOAD]
+        else:
+            put(out[POINTS + bare], PLACE, place)
+            put(out[POINTS + bare], FORCE, scale(-row[LOAD], vector(row, NORMAL)))
+            bare += 1
+    for k in range(POINTS, POINTS + more):
+        put(out[POINTS + bare], PLACE, vector(other[k], PLACE))
+        put(out[POINTS + bare], FORCE, scale(-1.0, vector(other[k], FORCE)))
+        bare += 1
+    return bare
+
+
+@inlined
+def _meet_in_order(
     both: Lines, s: float, t: float, gap: Vector, distance: float, diameter: float, stiffness: float,
     shared_p: int, shared_q: int, out: Array,
 ) -> int:  # fmt: skip
@@ -133,6 +190,18 @@ def meet_at(
 @inlined
 def meets_elsewhere(both: Lines, reach: float, shared_p: int, shared_q: int) -> int:
     """Return 0 if `meet_at` finds forces at the nearest points only, otherwise a positive number.
+
+    Arguments are those of `_meets_elsewhere_in_order`.
+    """
+    found = _meets_elsewhere_in_order(both, reach, shared_p, shared_q)
+    if shared_p & shared_q & EITHER_ORDER:
+        found += _meets_elsewhere_in_order(exchanged(both), reach, shared_q, shared_p)
+    return found
+
+
+@inlined
+def _meets_elsewhere_in_order(both: Lines, reach: float, shared_p: int, shared_q: int) -> int:
+    """Return 0 if `_meet_in_order` finds forces at the nearest points only, otherwise a positive number.
 
     Segments with a joint at their end, which are rare, always give a positive number. The points are computed exactly
     as in `_lie_along` and `_joint`, so that rounding does not make the results differ. The code has no branches, since
