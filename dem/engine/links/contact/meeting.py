@@ -171,6 +171,18 @@ def _halfway(both: Lines, s: float, t: float) -> Vector:
 
 
 @inlined
+def in_overlap(halfway: Vector, normal: Vector, radii: tuple[float, float]) -> Vector:
+    """Return the middle of the overlap of two segments [m], where friction acts.
+
+    Args:
+        halfway: point half way between the axes [m], which is the middle of the overlap if the radii are equal.
+        normal: unit vector from the second segment to the first [1].
+        radii: radii of the first and the second segment [m].
+    """
+    return along(halfway, 0.5 * (radii[1] - radii[0]), normal)
+
+
+@inlined
 def _note(
     out: Array, k: int, both: Lines, s: float, t: float, gap: Vector, distance: float, load: float, share: float,
     hardening: float,

@@ -32,6 +32,7 @@ from dem.engine.links.contact.meeting import (
     PLACE,
     POINTS,
     SHARE,
+    in_overlap,
     meet_at,
     meets_elsewhere,
 )
@@ -216,7 +217,8 @@ def push_apart(
     for k in range(_find_touching(line, pairs)):
         pair, s, t = pairs.touching[k], pairs.nearest[k, 0], pairs.nearest[k, 1]
         p, q = pairs.first[pair], pairs.second[pair]
-        both, diameter = lines(line[p], line[q]), line[p, RADIUS] + line[q, RADIUS]
+        radii = line[p, RADIUS], line[q, RADIUS]
+        both, diameter = lines(line[p], line[q]), radii[0] + radii[1]
         gap = between(both, s, t)
         squared, reach = dot(gap, gap), diameter * diameter
         if squared >= reach:
@@ -233,12 +235,13 @@ def push_apart(
         others = meets_elsewhere(both, reach, shared_p, shared_q)
         if (others == 0) & (distance < diameter):
             # Nine of ten: one point, and nothing that a branch would have to be predicted for.
-            place = scale(0.5, along(add(along(both.p, s, both.u), both.q), t, both.v))
+            halfway = scale(0.5, along(add(along(both.p, s, both.u), both.q), t, both.v))
+            normal = scale(1 / distance, gap)
             u, slope, hardening = stretch(depth, diameter)
             load = law.stiffness * u * slope
             closing = _rub(
-                law, damping, parts, rows, ledger, step, place, scale(1 / distance, gap), depth, load, load, 1.0,
-                hardening, pairs.slip[pair, 0],
+                law, damping, parts, rows, ledger, step, in_overlap(halfway, normal, radii), normal, depth, load, load,
+                1.0, hardening, pairs.slip[pair, 0],
             )  # fmt: skip
         else:
             bare = meet_at(both, s, t, gap, distance, diameter, law.stiffness, shared_p, shared_q, out)
@@ -252,8 +255,10 @@ def push_apart(
                 share = row[SHARE] if carried == load else row[SHARE] * carried / load
                 if carried <= 0.0:
                     lost += _forget(pairs, pair, 1 << slot)
+                normal = vector(row, NORMAL)
+                place = in_overlap(vector(row, PLACE), normal, radii)
                 rate = _rub(
-                    law, damping, parts, rows, ledger, step, vector(row, PLACE), vector(row, NORMAL),
+                    law, damping, parts, rows, ledger, step, place, normal,
                     diameter - row[DISTANCE], load, carried, share, row[HARDENING], pairs.slip[pair, slot],
                 )  # fmt: skip
                 closing = max(closing, rate)

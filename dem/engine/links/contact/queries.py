@@ -26,6 +26,7 @@ from dem.engine.links.contact.meeting import (
     PLACE,
     POINTS,
     SHARE,
+    in_overlap,
     meet,
 )  # fmt: skip
 from dem.engine.links.contact.pairs import motion_at
@@ -258,7 +259,8 @@ def forces_of_pairs(
             share, load, carried = row[SHARE], row[LOAD], row[CARRIED]
             if share <= 0.0:
                 continue
-            place, normal, force = vector(row, PLACE), vector(row, NORMAL), (0.0, 0.0, 0.0)
+            normal, force = vector(row, NORMAL), (0.0, 0.0, 0.0)
+            place = in_overlap(vector(row, PLACE), normal, (line[p, RADIUS], line[q, RADIUS]))
             if carried > 0.0:
                 velocity, _ = motion_at(parts, moving, place, normal)
                 _copy(slip, pairs.slip[k, slot])
