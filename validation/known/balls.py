@@ -120,8 +120,14 @@ def ball(radius: float, density: float) -> Ball:
     """Return a ball of a radius [m] and a density [kg/m³]."""
     length = 2 * radius * (1 + STUB)
     side = math.sqrt(4 / 3 * math.pi * radius**3 / length)
-    keys = {"middle_length": length, "thickness_normal": side, "thickness_in_plane": side, "density": density}
-    boxes = _SolidBoxes(barb_length=0.0, radius=radius, **keys)
+    boxes = _SolidBoxes(
+        middle_length=length,
+        barb_length=0.0,
+        thickness_normal=side,
+        thickness_in_plane=side,
+        density=density,
+        radius=radius,
+    )
     return Ball(boxes, SphereChain(rows=1, diameter=2 * radius, pitch=2 * radius))
 
 

@@ -126,8 +126,16 @@ class Plane:
 
     def law(self, access: EngineAccess, *, plane: bool = True) -> ContactLaw:
         """Return the law of contact with a plane, or with a ball."""
-        keys = {"restitution": self.restitution, "friction": self.friction, "ratio": self.ratio}
-        return law(access, stiffness=self.hertz.stiffness, mass=self.mass, dashpot=self.dashpot, plane=plane, **keys)
+        return law(
+            access,
+            stiffness=self.hertz.stiffness,
+            mass=self.mass,
+            restitution=self.restitution,
+            friction=self.friction,
+            ratio=self.ratio,
+            dashpot=self.dashpot,
+            plane=plane,
+        )
 
     def thrown(self, access: EngineAccess, speeds: Array, along: Array, spin: Array) -> Thrown:
         """Throw balls; return velocities away from the plane, along it, and spins, (n,) each, in the test's units."""
@@ -165,8 +173,15 @@ class Plane:
             of: y of the curve.
         """
         normal, span = np.full(len(along), self.restitution), float(np.ptp(published[:, 1]))
-        keys = {"friction": self.friction, "restitution": self.restitution, "lever": self.levers(access, speeds)}
-        after, spun = impacts(along, spin, ratio=self.ratio, dashpot=self.dashpot, **keys)
+        after, spun = impacts(
+            along,
+            spin,
+            friction=self.friction,
+            restitution=self.restitution,
+            ratio=self.ratio,
+            dashpot=self.dashpot,
+            lever=self.levers(access, speeds),
+        )
         theory = of(normal, after, spun, along, speeds)
         measured = of(*self.thrown(access, speeds, along, spin), along, speeds)
         off, found = (float(np.abs(y - published[:, 1]).max()) / span for y in (theory, measured))

@@ -104,17 +104,19 @@ def strut_buckles(access: EngineAccess) -> list[Answer]:
     }
     # Its own weight bends the straight strut by 1e-4 of its length, so that it buckles.
     weight = 0.0077 * BENDING / LENGTH**3 / (DENSITY * math.pi * DIAMETER**2 / 4)
-    one = scene_of({
-        "schema_version": 1,
-        "engine": access.name,
-        "seed": 1,
-        "count": 1,
-        "particle": rod,
-        "container": {"radius_m": 0.3},
-        "gravity_m_per_s2": weight,
-        "fidelity": {"base": "draft", "stiffness_N_per_m": 10},
-        "phases": [{"type": "deposit", "per_layer": 1}, RELAX],
-    })
+    one = scene_of(
+        {
+            "schema_version": 1,
+            "engine": access.name,
+            "seed": 1,
+            "count": 1,
+            "particle": rod,
+            "container": {"radius_m": 0.3},
+            "gravity_m_per_s2": weight,
+            "fidelity": {"base": "draft", "stiffness_N_per_m": 10},
+            "phases": [{"type": "deposit", "per_layer": 1}, RELAX],
+        }
+    )
     engine = build_engine(one, time_step(one))
     engine.add(Poses(np.array([[0.0, 0.0, 0.2]]), (Rotation.identity(),), np.zeros(1, np.int64)))
     assert engine.filaments is not None
@@ -171,21 +173,23 @@ def pulled(access: EngineAccess, degrees: float, friction: float) -> tuple[float
         "stretching_time_s": 2e-3,
         "bending_time_s": 2e-3,
     }
-    one = scene_of({
-        "schema_version": 1,
-        "engine": access.name,
-        "seed": 1,
-        "count": 1,
-        "particle": rope,
-        "container": {"radius_m": 0.3},
-        "gravity_m_per_s2": 1e-6,
-        "contact": {"friction_wall": friction, "restitution": 0.2},
-        "hooks": {"side_m": 2 * BAR, "length_m": 0.2, "lower_height_m": 0.05, "upper_height_m": 0.25},
-        "fidelity": {"base": "draft", "stiffness_N_per_m": 200},
-        "phases": [{"type": "deposit", "per_layer": 1}, RELAX],
-    })
+    one = scene_of(
+        {
+            "schema_version": 1,
+            "engine": access.name,
+            "seed": 1,
+            "count": 1,
+            "particle": rope,
+            "container": {"radius_m": 0.3},
+            "gravity_m_per_s2": 1e-6,
+            "contact": {"friction_wall": friction, "restitution": 0.2},
+            "hooks": {"side_m": 2 * BAR, "length_m": 0.2, "lower_height_m": 0.05, "upper_height_m": 0.25},
+            "fidelity": {"base": "draft", "stiffness_N_per_m": 200},
+            "phases": [{"type": "deposit", "per_layer": 1}, RELAX],
+        }
+    )
     engine = build_engine(one, time_step(one))
-    points = wound(degrees, segments) + [0.0, 0.05, 0.25]
+    points = wound(degrees, segments) + np.array([0.0, 0.05, 0.25])
     kinds = np.zeros(1, np.int64)
     engine.add(Poses(points.mean(axis=0)[None], (Rotation.identity(),), kinds, (Bent(points),)))
     held = engine.filaments
@@ -223,6 +227,7 @@ def rope_slides(access: EngineAccess) -> list[Answer]:
 
 SILO, GRAIN = 10e-3, 2e-3  # radii of silo and balls [m]
 DRAGGED = 0.8e-3  # way of the wall [m]; its lower edge stays below the floor
+RESTING, LATEST = 1e-4, 3.0  # mean net force on a ball over its weight [1], and end of waiting for it [s]
 ON_WALL, BETWEEN = 0.3, 0.5  # friction of wall and floor, and between balls
 
 
@@ -236,8 +241,9 @@ def filled(access: EngineAccess, layers: int) -> tuple[float, float, float, floa
     mass, cylinder = body.boxes.mass, Cylinder(radius=SILO, height=0.3, facets=16)
     contact = law(access, stiffness=500.0, mass=mass, restitution=0.3, friction=BETWEEN, dashpot=0.5)
     contact = dataclasses.replace(contact, wall_friction=ON_WALL)
-    keys = {"law": contact, "gravity": G, "time_step": 5e-5, "shaken": False}
-    engine: Engine = access.engine(particle=body, cylinder=cylinder, **keys)
+    engine: Engine = access.engine(
+        particle=body, cylinder=cylinder, law=contact, gravity=G, time_step=5e-5, shaken=False
+    )
     for layer, turn in enumerate(rng.uniform(0, 2 * math.pi, layers)):
         for k in range(4):
             x, y = 2.2 * GRAIN * math.cos(turn + math.pi / 2 * k), 2.2 * GRAIN * math.sin(turn + math.pi / 2 * k)
@@ -246,8 +252,26 @@ def filled(access: EngineAccess, layers: int) -> tuple[float, float, float, floa
     engine.boundaries.lift_wall(DRAGGED / 0.15)
     engine.advance(round(0.15 / engine.time_step))
     engine.boundaries.stop()
-    engine.advance(round(0.2 / engine.time_step))
+    while engine.unbalanced_force() > RESTING and engine.time < LATEST:
+        engine.advance(round(0.05 / engine.time_step))
     found = engine.contact_forces()
     floor, wall = (found.forces[found.boundaries == boundary] for boundary in (FLOOR, WALL))
     inwards = float(np.linalg.norm(wall[:, :2], axis=1).sum())
     return 4 * layers * mass * G, float(floor[:, 2].sum()), float(wall[:, 2].sum()), inwards
+
+
+@case(
+    "silo",
+    "100 balls in a silo of 5 diameters, whose wall was dragged upwards and stopped",
+    "statics: floor and wall bear the weight; Coulomb: the wall at most μ times its normal forces",
+)
+def silo(access: EngineAccess) -> list[Answer]:
+    weight, floor, wall, inwards = filled(access, 25)
+    rest = "ten times the mean net force on a ball, over its weight, that counts as rest"
+    arches = "friction at the wall is near its limit: the floor bears what is left"
+    return [
+        Answer("force of floor and wall [N]", weight, floor + wall, 1e-3, rest),
+        Answer(
+            "weight that the wall bears, over the most by Coulomb [1]", 0.8, wall / (ON_WALL * inwards), 0.25, arches
+        ),
+    ]
