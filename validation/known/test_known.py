@@ -13,10 +13,11 @@ from dem.physics.contact import damping_ratio, restitution_of
 from validation.access import engine_access
 from validation.cases import CASES, LADDERS, Answer
 from validation.conftest import ON, Tables
-from validation.known import floor, free, hinge, impact, kept
+from validation.known import chung, floor, free, granular, hinge, impact, kept, statics
+from validation.known.balls import EQUAL_PHASE, Hertz, Material, mindlin_impacts
 from validation.known.theory import bounced, dashpot_impact, falling_on_springs, free_rotation
 
-assert all((free, kept))  # imported to register their cases
+assert all((free, granular, kept, statics))  # imported to register their cases
 
 Call = Callable[..., Any]
 
@@ -182,3 +183,29 @@ def test_springs_about_the_centre_are_one_spring_of_their_sum() -> None:
     one = dashpot_impact(stiffness=400.0, damping=0.08, mass=1e-4)
     assert after == pytest.approx([0.1 * one.restitution, 0, 0], rel=2e-3, abs=1e-9)
     assert lasts == pytest.approx(one.duration, rel=0.01)
+
+
+@pytest.mark.parametrize("material", [chung.STEEL, chung.POLYETHYLENE], ids=lambda material: material.name)
+def test_published_curves_of_test_5_are_those_of_half_of_mindlins_stiffness(material: Material) -> None:
+    def off(share: float) -> float:
+        found = []
+        for name in ("recoil", "spin after"):
+            x, y = chung.curve(5, name, material.name).T
+            after, spun = mindlin_impacts(0.3 * x, friction=0.3, ratio=share * material.mindlin)
+            here = (after + spun if name == "recoil" else spun) / 0.3
+            found.append(float(np.abs(here - y).max() / np.ptp(y)))
+        return max(found)
+
+    assert off(chung.HALF) < 0.02
+    assert off(1.0) > 0.15
+
+
+def test_equal_phases_of_tangential_vibrations() -> None:
+    # Without slip, ∫ω dt over Hertz's contact, from the energy, is that of linear springs 6/5 times as stiff.
+    hertz = Hertz(modulus=0.75, radius=1.0, mass=1.0, speed=1.0)
+    place = np.sin(np.linspace(0, math.pi / 2, 200001)) ** 0.8  # overlap over the largest, even where it turns
+    middle = (place[1:] + place[:-1]) / 2
+    speed = np.sqrt(1 - middle**2.5)
+    phase = 2 * float((np.sqrt(1.5 * np.sqrt(middle * hertz.deepest)) * np.diff(place) / speed).sum()) * hertz.deepest
+    assert phase == pytest.approx(math.pi * math.sqrt(EQUAL_PHASE), rel=1e-3)
+    assert hertz.duration == pytest.approx(2 * float((np.diff(place) / speed).sum()) * hertz.deepest, rel=1e-3)
