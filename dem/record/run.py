@@ -139,7 +139,8 @@ class Run(Shown):
 
         The frame at the end of the phase is left out if it follows at another interval, unless it is the only one.
         """
-        if len(part) < 2:
+        step = self.manifest.phases[part[-1].phase].time_step_s if len(part) > 1 else None
+        if step is None:  # runs without it are older than frames at the ends of phases
             return part
         try:
             recording = self.scene["recording"]
@@ -147,7 +148,6 @@ class Run(Shown):
         except InputError:  # frames can be measured without the scene file
             return part
         interval, last = sample * max(1, round(interval / sample)), float(part.times[-1])
-        step = self.manifest.phases[part[-1].phase].time_step_s or self.manifest.time_step_s
         # A frame at an interval is on the step nearest to its time; times in the list are rounded to nine digits.
         near = abs(last - interval * round(last / interval)) <= 0.5001 * step + 1e-8 * last
         return part if near else part[:-1]

@@ -232,21 +232,18 @@ def compare_bits(one: Run, other: Run) -> dict[str, Any]:
         series: whether all common columns are equal; None if a run has no series.
         differs_at: simulated time of the first different sample [s]; None if all samples are equal.
         frames: number of equal frames; the files of A and B may have different formats.
-        compared: number of frames that both runs have.
-        same_count: whether the runs have equal numbers of frames, samples and columns.
+        compared: number of frames at equal times; runs of older versions lack those at the ends of phases.
+        same_count: whether the runs have frames at the same times, and equal numbers of samples and columns.
         identical: whether nothing differs.
     """
     import numpy as np  # noqa: PLC0415
 
-    frames = [
-        list(zip(run.frames.paths, run.frames.numbers, strict=True)) if has_frames(run.path) else []
-        for run in (one, other)
-    ]
-    same = sum(_equal_frames(*pair) for pair in zip(*frames, strict=False))
-    compared = min(map(len, frames))
+    first, second = map(_by_time, (one, other))
+    common = first.keys() & second.keys()
+    same, compared = sum(_equal_frames(first[time], second[time]) for time in common), len(common)
     series: bool | None = None
     differs_at = None
-    alike = len(frames[0]) == len(frames[1]) and one.has_series == other.has_series
+    alike = first.keys() == second.keys() and one.has_series == other.has_series
     if one.has_series and other.has_series:
         a, b = one.series, other.series
         alike = alike and len(a.time) == len(b.time) and a.data.keys() == b.data.keys()
@@ -264,6 +261,14 @@ def compare_bits(one: Run, other: Run) -> dict[str, Any]:
     identical = series is not False and same == compared and alike
     found = {"series": series, "differs_at": differs_at, "frames": same, "compared": compared}
     return {**found, "same_count": alike, "identical": identical}
+
+
+def _by_time(run: Run) -> dict[str, tuple[Path, int]]:
+    """Return file and number of each frame of a run by its time, as `frames.pvd` writes it."""
+    if not has_frames(run.path):
+        return {}
+    frames = run.frames
+    return {f"{frames.times[k]:.9g}": (frames.paths[k], frames.numbers[k]) for k in range(len(frames))}
 
 
 def _equal_frames(one: tuple[Path, int], other: tuple[Path, int]) -> bool:
