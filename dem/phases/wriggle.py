@@ -8,10 +8,11 @@ from pydantic import Field
 
 from dem.body.filament import Activity
 from dem.engine.interface import Engine
-from dem.errors import rounded_down
+from dem.errors import rounded_down, rounded_up
 from dem.phases.phase import SceneView, TimedPhase, spans_of_wave
 from dem.setting.part import Duration, Length, Part
 from dem.setting.span import Span
+from dem.strict import SAME
 
 TIGHTEST = 0.5  # of a filament's curvature times its diameter: a bend in which it would touch itself
 
@@ -41,6 +42,16 @@ class Wriggle(Part, TimedPhase):
         "no reversals",
     )
     ramp_s: float = Field(0.2, ge=0, le=1e6, description="time in which the curvature grows from 0 [s]")
+
+    def check(self, scene: SceneView, index: int) -> Iterator[str]:
+        wave, kinds = self.wavelength_m, () if scene.mixture is None else scene.mixture.kinds
+        longest = max((kind.filament.segment_length for kind in kinds if kind.filament is not None), default=0.0)
+        # Nodes would sample a shorter wave as a longer one.
+        if wave is not None and wave < 2 * longest * (1 - SAME):
+            yield (
+                f"phases.{index}.wavelength_m: {wave:g} m is less than two segments, of {longest:.3g} m each; use at "
+                f"least {rounded_up(2 * longest)} m, or more segments"
+            )
 
     def warnings(self, scene: SceneView, index: int) -> Sequence[str]:
         most = TIGHTEST / scene.sphere_diameter

@@ -107,6 +107,8 @@ def test_a_plan_has_their_step_and_effects() -> None:
     ({"motor": {"law": "stall"}}, "motor: other shapes have no hinges"),
     ({"phases.2.duration_s": 1}, "phases.2.duration_s: 1 s is too short to raise by distance_m = 0.015 m"),
     ({"phases.2.speed_m_per_s": 0}, "phases.2.speed_m_per_s: 0 m/s is out of range"),
+    ({"phases.1.wavelength_m": 0.004},
+     "phases.1.wavelength_m: 0.004 m is less than two segments, of 0.0025 m each; use at least 0.005 m"),
     ({"phases.1.frequency_hz": -1}, "phases.1.frequency_hz: -1 Hz is out of range; use at least 0 Hz"),
     ({"container.radius_m": 0.01}, "container.radius_m: 0.01 m is narrower than a body"),
     ({"phases.2": {"type": "internal-oscillation", "theta_deg": 5, "duration_s": 1}},
