@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import builds
 import numpy as np
 import pytest
 
@@ -61,9 +62,10 @@ def simulated(folder: Path, name: str, overrides: tuple[str, ...], holds: Holds)
 
 @pytest.mark.parametrize("case", CASES)
 def test_they_are_what_moves_smarticles_and_what_boundaries_feel(tmp_path: Path, case: str) -> None:
-    engine, found = simulated(tmp_path, *CASES[case])
+    engine, _ = simulated(tmp_path, *CASES[case])
     world = engine._world
     engine.set_time_step(NO_TIME)
+    found = engine.contact_forces()
     engine.advance(1)
     on_each, between = np.zeros((engine.count, 3)), found.boundaries == NONE
     np.add.at(on_each, found.smarticles[:, 0], found.forces)
@@ -84,3 +86,16 @@ def test_nothing_is_changed_by_asking(tmp_path: Path) -> None:
     engine.contact_forces()
     for name, array in engine._world.arrays.items():
         np.testing.assert_array_equal(array, before[name], err_msg=name)
+
+
+def test_friction_of_a_link_that_slides_is_coulombs() -> None:
+    made = builds.engine(gravity=9.81)
+    made.add(builds.at([0.0, 0.0, builds.DIAMETER / 2]))
+    made._world.posed().velocity[0] = 0.0, 0.3, 0.0
+    made.advance(100)
+    for _ in range(20):
+        made.advance(7)
+        found = made.contact_forces()
+        assert found.normal.sum() > 0.3 * made.particle.mass * 9.81
+        np.testing.assert_allclose(found.tangential, builds.LAW.wall_friction * found.normal, rtol=1e-9)
+    assert made.state().velocities[0, 1] > 0.1  # it slides on

@@ -578,13 +578,13 @@ class World:
             [
                 _rows(
                     lambda rows: forces_of_pairs(
-                        law, bodies, parts, segments, self.pairs, self.links, self.meeting, slip, rows
+                        law, bodies, parts, segments, self.pairs, self.links, self.time_step, self.meeting, slip, rows
                     )
                 ),
                 _rows(
                     lambda rows: forces_of_boundaries(
-                        wall_law, bodies, parts, segments, self.kept, known, self.links, self.meeting, contacts, slip,
-                        rows,
+                        wall_law, bodies, parts, segments, self.kept, known, self.links, self.time_step, self.meeting,
+                        contacts, slip, rows,
                     )
                 ),
             ]

@@ -231,14 +231,15 @@ def _copy(slip: Array, kept: Array) -> None:
 
 @kernel
 def forces_of_pairs(
-    law: Law, bodies: Bodies, parts: Parts, segments: Segments, pairs: Pairs, links: Indices, out: Array, slip: Array,
-    rows: Array,
+    law: Law, bodies: Bodies, parts: Parts, segments: Segments, pairs: Pairs, links: Indices, dt: float, out: Array,
+    slip: Array, rows: Array,
 ) -> int:  # fmt: skip
     """Write the forces of bodies on each other, one row per point of contact and per bare force.
 
     Args:
         pairs: pairs that may touch, with their tangential springs.
         links: (Q,) code of each segment's link, see `dem.body.forces.at_links`.
+        dt: length of the next step [s], in which tangential springs are stretched before their forces act.
         out: scratch of `meet`.
         slip: (4,) scratch.
         rows: (…, WIDTH) written; for the columns see `FIRST`.
@@ -262,10 +263,11 @@ def forces_of_pairs(
             normal, force = vector(row, NORMAL), (0.0, 0.0, 0.0)
             place = in_overlap(vector(row, PLACE), normal, (line[p, RADIUS], line[q, RADIUS]))
             if carried > 0.0:
-                velocity, _ = motion_at(parts, moving, place, normal)
+                velocity, turning = motion_at(parts, moving, place, normal)
                 _copy(slip, pairs.slip[k, slot])
                 share = share if carried == load else share * carried / load
-                force = resist(law, damping, carried, share, row[HARDENING], normal, velocity, 0.0, 0.0, slip)
+                twist = 0.5 * dt * turning
+                force = resist(law, damping, carried, share, row[HARDENING], normal, velocity, twist, dt, slip)
             count = _write(rows, count, first, second, load, carried, place, normal, force)
         for bare in range(POINTS, POINTS + met - 1):
             # A spring's, without a normal of its own: nothing of it is friction.
@@ -279,7 +281,7 @@ def forces_of_pairs(
 @kernel
 def forces_of_boundaries(
     law: Law, bodies: Bodies, parts: Parts, segments: Segments, kept: Kept, known: Boundaries, links: Indices,
-    out: Array, contacts: Array, slip: Array, rows: Array,
+    dt: float, out: Array, contacts: Array, slip: Array, rows: Array,
 ) -> int:  # fmt: skip
     """Write the forces of boundaries on bodies, one row per contact.
 
@@ -287,6 +289,7 @@ def forces_of_boundaries(
         kept: memory of the contacts, with their tangential springs.
         known: the boundaries.
         links: (Q,) code of each segment's link, see `dem.body.forces.at_links`.
+        dt: length of the next step [s], in which tangential springs are stretched before their forces act.
         out: scratch of `meet`.
         contacts: scratch of `contacts_of_segment`.
         slip: (4,) scratch.
@@ -304,11 +307,12 @@ def forces_of_boundaries(
         for k in range(number):
             contact = contacts[k]
             share, normal = contact[PARTLY], vector(contact, AT)
-            place, velocity, speed, _ = place_and_motion(radius, parts, known.ground, segments.part[p], contact)
+            place, velocity, speed, turning = place_and_motion(radius, parts, known.ground, segments.part[p], contact)
             relative = velocity[0], velocity[1], velocity[2] - speed
             _copy(slip, kept.slip[p, int(contact[SLOT])])
             u, slope, hardening = stretch(contact[DEPTH], contact[ROOM])
             load = law.stiffness * u * slope * share
-            force = resist(law, damping, load, share, hardening, normal, relative, 0.0, 0.0, slip)
+            twist = 0.5 * dt * turning
+            force = resist(law, damping, load, share, hardening, normal, relative, twist, dt, slip)
             count = _write(rows, count, links[p], -1 - contact[PART], load, load, place, normal, force)
     return count
