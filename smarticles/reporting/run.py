@@ -232,25 +232,30 @@ def _lifted(run: Run) -> list[int]:
     return [phase.index for phase in made.phases if made.held(phase.index) or made.dropped(phase.index)]
 
 
+def _plan_blocks(scene: Scene) -> list[Markup]:
+    try:
+        planned = plan(scene)
+    except InputError as error:
+        return [words(f"This version does not run the scene of this run: {error}", tone="warning")]
+    rows = [
+        [
+            str(phase.index), phase.type,
+            f"{phase.duration_s:.4g}" if phase.duration_s is not None else f"≈ {phase.estimate_s:.3g}",
+            f"{phase.time_step_s:.3g}",
+        ]
+        for phase in planned.phases
+    ]  # fmt: skip
+    phases = table("Phases", ["phase", "type", "duration [s]", "time step [s]"], rows)
+    return [phases, *(words(f"Warning of the plan: {warning}", tone="warning") for warning in planned.warnings)]
+
+
 def scene_blocks(directory: Path, scene: Scene | None, scene_error: str) -> list[Markup]:
     """Return HTML blocks about a scene: table of phases, warnings of the plan, and text of the scene file.
 
     The folder has the scene file. `scene_error` replaces phases and warnings if this version cannot read the scene
     (None).
     """
-    blocks = [words(scene_error, tone="warning")] if scene is None else []
-    if scene is not None:
-        planned = plan(scene)
-        rows = [
-            [
-                str(phase.index), phase.type,
-                f"{phase.duration_s:.4g}" if phase.duration_s is not None else f"≈ {phase.estimate_s:.3g}",
-                f"{phase.time_step_s:.3g}",
-            ]
-            for phase in planned.phases
-        ]  # fmt: skip
-        blocks.append(table("Phases", ["phase", "type", "duration [s]", "time step [s]"], rows))
-        blocks += [words(f"Warning of the plan: {warning}", tone="warning") for warning in planned.warnings]
+    blocks = [words(scene_error, tone="warning")] if scene is None else _plan_blocks(scene)
     file = directory / SCENE
     if file.is_file():
         text = file.read_text(encoding="utf-8", errors="replace")

@@ -173,6 +173,14 @@ def test_a_scene_of_another_version_is_reported_and_no_reason_to_fail(
     assert "This version cannot read the scene of this run" in Read(run / "report.html").text
 
 
+def test_a_scene_that_is_refused_today_is_reported(run: Path, smarticles: Smarticles) -> None:
+    wide = {"count": 12, "engine": "links", "smarticle": {"thickness_normal_m": 3e-3}}
+    scene = small(wide | {"fidelity": {"base": "standard", "rows": 2}})
+    (run / "scene.yaml").write_text(dump_scene(scene), encoding="utf-8")
+    assert smarticles("report", run).status == 0
+    assert "2 rows side by side leave holes" in (run / "report.html").read_text()
+
+
 def test_what_exists_is_kept_and_what_is_no_run_rejected(run: Path, tmp_path: Path, smarticles: Smarticles) -> None:
     (run / "report.html").write_text("mine")
     said = smarticles("report", run)
