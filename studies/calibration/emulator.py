@@ -52,7 +52,7 @@ class Emulator:
         The fraction is at most r², the squared correlation of n values with their predictions. If these are
         independent, r² is above t²/(n - 2 + t²) with a probability of 0.001, where t is that quantile of Student's
         distribution with n - 2 degrees of freedom. Since lengths and noise are fitted to all values, of 240 emulators
-        of pure noise (12 to 60 runs, 2 to 4 parameters) 3 were above it.
+        of pure noise (12 to 60 runs, 2 to 4 parameters) 2 were above it.
         """
         freedom = len(self.inputs) - 2
         quantile = float(t.ppf(1 - CHANCE, freedom))
