@@ -7,8 +7,15 @@ besides: kinetic energy must not grow. In LAMMPS it did, at 76° from the normal
 
 import math
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from dem.body.placement import Poses
+from dem.body.state import RigidState
+from dem.engine.links.engine import LinksEngine
+from dem.run.build import build_engine
 from validation.access import EngineAccess
-from validation.bench import add
+from validation.bench import RELAX, add, scene_of
 from validation.cases import Answer, case
 from validation.known.balls import RESOLVED, SOLID, ball, law, on_plane
 
@@ -111,3 +118,52 @@ def at_76_degrees(access: EngineAccess, *, pair: bool) -> list[Answer]:
         Answer("gain of kinetic energy, largest, 50° to 88° [1]", 0.0, max(0.0, *gains), 1e-12, GUARD, scale=1.0),
         recorded("kinetic energy, over that before [1]", GRAZING[access.name][pair], energy),
     ]
+
+
+# -- a short rod -------------------------------------------------------------------------------------------------------
+
+
+@case(
+    "short rod of a scene",
+    "a rod as long as it is thick slides over a plane, across its axis and along it",
+    "impulse theory, with the moments of a cylinder: m R²/2 about the axis, m (3 R² + L²)/12 across it",
+    absent={"yade": "the test sets velocities of bodies of bars on links only"},
+)
+def short_rod(access: EngineAccess) -> list[Answer]:
+    length, speed, slip, friction = 2 * RADIUS * 1.001, 0.2, 1.5, 0.3
+    one = scene_of(
+        {
+            "schema_version": 1,
+            "engine": access.name,
+            "seed": 1,
+            "count": 1,
+            "particle": {"shape": "rod", "length_m": length, "diameter_m": 2 * RADIUS, "density_kg_per_m3": DENSITY},
+            "container": {"radius_m": 0.1},
+            "gravity_m_per_s2": 1e-6,
+            "contact": {"friction_wall": friction, "restitution": 0.9, "tangential_damping_ratio": 0},
+            "fidelity": {"base": "draft", "stiffness_N_per_m": 1e6},
+            "phases": [{"type": "deposit", "per_layer": 1}, RELAX],
+        }
+    )
+    mass = DENSITY * math.pi * RADIUS**2 * length
+    dt = math.pi * math.sqrt(mass / 2e6) / RESOLVED
+    answers = []
+    for name, axis, inertia in (("across", 1, RADIUS**2 / 2), ("along", 0, (3 * RADIUS**2 + length**2) / 12)):
+        engine = build_engine(one, dt)
+        assert isinstance(engine, LinksEngine)
+        place = np.array([[0.0, 0.0, RADIUS + 3.3 * speed * dt]])
+        engine.add(Poses(place, (Rotation.identity(),), np.zeros(1, np.int64)))
+        velocity = np.array([0.0, 0.0, -speed])
+        velocity[axis] = slip
+        engine._world.bodies.velocity[0] = velocity
+        engine.advance(4 + 2 * RESOLVED)
+        state = engine.state()
+        assert isinstance(state, RigidState)
+        impulse = friction * (speed + state.velocities[0, 2])  # over the mass, as friction law and normal velocity say
+        spin = float(np.linalg.norm(state.spins[0]))
+        lost = float(slip - state.velocities[0, axis])
+        answers += [
+            Answer(f"velocity lost, {name} [m/s]", impulse, lost, 0.01, SLIDES),
+            Answer(f"spin, {name} [rad/s]", impulse * RADIUS / inertia, spin, 0.01, f"{SLIDES}; the contact's depth"),
+        ]
+    return answers
