@@ -1,4 +1,4 @@
-"""The bits of a run do not depend on the processor: BLAS kernels and SIMD paths of NumPy and Numba are varied."""
+"""The bits of a run do not depend on the processor: BLAS kernels and SIMD paths of NumPy are varied."""
 
 import json
 import os
