@@ -252,6 +252,7 @@ def blocks() -> Scene:
     recording = {"series_interval_s": 2e-3, "frame_interval_s": 0.04, "checkpoint_interval_s": 0.02}
     everything: dict[str, Any] = {
         "engine": "links",
+        "seed": 2,
         "count": 40,
         "particle": STAPLE,
         "container.radius_m": 0.011,
