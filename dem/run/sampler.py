@@ -17,7 +17,7 @@ from dem.record.columns import COLUMNS, EVERY, GRIP_COLUMNS, STRAIN_COLUMNS, Col
 from dem.record.packing import packing_fraction
 
 HINGE_ENERGY = "hinge_elastic_energy_J"
-KEPT = ("before", "hooks", "plate", "grips", "grips_made", "strain")  # keys of `Sampler.memory`
+KEPT = ("before", "hooks", "plate", "grips", "grips_made", "strain", "strain_phase")  # keys of `Sampler.memory`
 
 
 @dataclass
@@ -28,7 +28,8 @@ class Sampler:
     effects: Set[EffectName] = frozenset()  #: Effects of the scene
     memory: dict[str, Any] = field(default_factory=lambda: dict.fromkeys(KEPT))
     """Plain data of the previous sample. `before`: time [s], impulse of gravity [N s], momentum [kg m/s]; `hooks`,
-    `plate`, `grips` and `strain`: number of steps, and forces summed over steps [N]; `grips_made`: number of grips."""
+    `plate`, `grips` and `strain`: number of steps, and forces summed over steps [N]; `grips_made`: number of grips;
+    `strain_phase`: number of the phase that has tied the strings."""
 
     @property
     def described(self) -> Columns:
@@ -69,7 +70,7 @@ class Sampler:
             if not engine.boundaries.enclosed:
                 phi = math.nan  # a pile that spreads fills no cylinder
         if EffectName.STRINGS in self.effects:
-            extra |= self._strain_row(engine, state)
+            extra |= self._strain_row(engine, state, phase)
             # The momentum balance includes the strings, whose forces act on the chain.
             pulls = extra["string_fixed_force_N"] + extra["string_pulled_force_N"]
             container_force += np.nan_to_num(pulls)
@@ -145,18 +146,23 @@ class Sampler:
         row["elongation_m"] = math.hypot(*(moved[-1] - moved[-2]))
         return row | {"grip_distance_m": math.dist(*grips.places[-2:])}, pull
 
-    def _strain_row(self, engine: Engine, state: PileState) -> dict[str, Any]:
+    def _strain_row(self, engine: Engine, state: PileState, phase: int) -> dict[str, Any]:
         strings, none = engine.strings, np.full(3, math.nan)
         row: dict[str, Any] = dict.fromkeys(STRAIN_COLUMNS, math.nan)
         row |= {name: none for name in STRAIN_COLUMNS if name.endswith("_force_N")}
-        if not engine.count:
-            return row
-        row["chain_width_m"] = extent(state.smarticles, 2 * engine.particle.radius)
-        if not strings.tied:
-            self.memory["strain"] = None
-            return row
+        if engine.count:
+            row["chain_width_m"] = extent(state.smarticles, 2 * engine.particle.radius)
         walls = engine.boundaries.channel_sums
-        sums = np.concatenate([strings.sums, walls if len(walls) else np.zeros((2, 3))])
+        ends = [strings.sums if strings.tied else np.zeros((2, 3)), walls if len(walls) else np.zeros((2, 3))]
+        sums = np.concatenate(ends)
+        if not strings.tied:
+            self.memory.update(strain=[engine.steps, sums.tolist()], strain_phase=None)
+            return row
+        previous = self.memory["strain"]
+        if previous is not None and self.memory.get("strain_phase") != phase:
+            # Strings that are tied anew begin at 0; walls do not.
+            self.memory["strain"] = [previous[0], [*np.zeros((2, 3)).tolist(), *previous[1][2:]]]
+        self.memory["strain_phase"] = phase
         row["pulled_m"] = strings.pulled
         row["chain_length_m"] = float(np.ptp(strings.ties[:, 0]))
         means = self._mean_since("strain", engine.steps, sums)

@@ -103,7 +103,7 @@ def chain_of(run: Run) -> Chain:
         diameter=run.manifest.sphere_diameter_m,
         rows=rows,
         width=run.manifest.thickness_normal_m,
-        pitch=pitch * run.manifest.sphere_diameter_m if run.manifest.engine == "yade" else 0.0,
+        pitch=pitch * run.manifest.sphere_diameter_m if run.manifest.engine != "links" else 0.0,
         bulge=run.manifest.bulge_m,
     )
 

@@ -79,8 +79,8 @@ def read_pull(run: Run, series: Series, phase: int) -> HookPull:
     """
     inside = np.nonzero(series["phase"] == phase)[0]
     force = -series["hook_upper_force_N"][:, 2]
-    # Hooks move with the container, which is at rest during a pull.
-    height = series["hook_upper_z_m"]
+    # Hooks move with the container.
+    height = series["hook_upper_z_m"] - series["container_z_m"]
     if len(inside) < 2 or inside[0] == 0 or not np.isfinite(force[inside]).all():
         raise InputError(f"{series.path}: no force of a hook throughout phase {phase} of {run.path}; run it again")
     span = np.concatenate([[inside[0] - 1], inside])

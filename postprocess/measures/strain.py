@@ -12,6 +12,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from dem.arrays import Flags
 from dem.errors import InputError
 from dem.record.run import Run
 from dem.record.series import Series
@@ -84,30 +85,37 @@ class StrainTest:
         return int(np.flatnonzero(self.forces >= CARRIES * self.forces.max())[-1])
 
 
-def has_strain(series: Series) -> bool:
-    """Return whether a series has `LEAST_SAMPLES` samples with tied strings, and a force above 0 in one."""
+def has_strain(series: Series, phase: int | None = None) -> bool:
+    """Return whether a phase has `LEAST_SAMPLES` samples with tied strings, and a force above 0 in one; None: any."""
     if "string_pulled_force_N" not in series.data:
         return False
     force = series["string_pulled_force_N"][:, 0]
-    tied = np.isfinite(series["chain_length_m"]) & np.isfinite(force)
+    tied = _during(series, phase) & np.isfinite(series["chain_length_m"]) & np.isfinite(force)
     return int(tied.sum()) >= LEAST_SAMPLES and bool((force[tied] > 0).any())
 
 
-def _strain_of(run: Run, _: Series, __: int) -> tuple[float, ...]:
-    values = measured(read_strain_test(run))
+def _during(series: Series, phase: int | None) -> Flags:
+    return np.full(len(series.time), True) if phase is None else np.asarray(series["phase"] == phase)
+
+
+def _strain_of(run: Run, _: Series, phase: int) -> tuple[float, ...]:
+    values = measured(read_strain_test(run, phase))
     if run.status.state != "done":
         # The chain may yet carry more, so that fracture and yield are unknown.
         values |= dict.fromkeys((FRACTURE, YIELD, DROP), math.nan)
     return tuple(values[name] for name in QUANTITIES)
 
 
-def read_strain_test(run: Run) -> StrainTest:
-    """Read the strain test of a run from its series; InputError if the run has none."""
+def read_strain_test(run: Run, phase: int | None = None) -> StrainTest:
+    """Read a strain test from the series of a run; InputError if there is none.
+
+    `phase` is the index of its phase, None that of the only one in the run.
+    """
     series = run.series
-    if not has_strain(series):
+    if not has_strain(series, phase):
         raise InputError(f"{run.path}: no chain was pulled in this run; give runs of the study chain")
     length, force = series["chain_length_m"], series["string_pulled_force_N"][:, 0]
-    shown = np.isfinite(length)
+    shown = _during(series, phase) & np.isfinite(length)
     first = length[shown][0]
     shown &= np.isfinite(force)
     outwards = np.stack([-series["channel_lower_force_N"][:, 1], series["channel_upper_force_N"][:, 1]])
@@ -198,6 +206,6 @@ MEASURES = (
         phases=(STRAIN,),
         quantities=tuple(_MEANINGS),
         take=_strain_of,
-        available_for=lambda series, _: has_strain(series),
+        available_for=has_strain,
     ),
 )

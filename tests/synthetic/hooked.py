@@ -58,13 +58,15 @@ def write_hooked_run(
     lower = -HELD * np.where(since[:, None] > 0, upper, 0.0)
     raised = SPEED * np.minimum(since, stops)
     work = np.cumsum(-upper[:, 2] * np.diff(raised, prepend=0.0))
+    # A vibration may move the container, and hooks with it.
+    floor = run.floor_z + np.where(since > 0, 3e-4 * np.sin(2 * np.pi * 13 * since), 0.0)
     columns = {
         "time_s": times,
         "phase": phase,
         "hook_upper_force_N": upper,
         "hook_lower_force_N": lower,
-        "hook_upper_z_m": UPPER + run.floor_z + raised,
-        "container_z_m": np.full(len(times), run.floor_z),
+        "hook_upper_z_m": UPPER + floor + raised,
+        "container_z_m": floor,
         "container_work_J": work,
     }
     if spent is not None:

@@ -122,6 +122,8 @@ def test_the_chain_of_a_run_follows_its_scene_and_manifest():
     manifest = SimpleNamespace(sphere_diameter_m=2.0, thickness_normal_m=5.0, engine="yade", bulge_m=0.5)
     run = SimpleNamespace(scene={"fidelity": {"rows": 2, "pitch": 1.3}}, manifest=manifest)
     assert chain_of(run) == links.Chain(diameter=2.0, rows=2, width=5.0, pitch=2.6, bulge=0.5)
+    manifest.engine = "lammps"
+    assert chain_of(run).pitch == 2.6
     manifest.engine = "links"
     assert chain_of(run).pitch == 0.0
 
