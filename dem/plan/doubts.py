@@ -10,6 +10,8 @@ from dem.scene.scene import Scene
 # Angles of bodies and swings of barbs; as degrees, values below π leave bodies straight and barbs at rest.
 _LARGE = ("angle_deg", "angles_deg", "theta_deg", "amplitude_deg")
 _ROUND, _NEAR = 5.0, 0.3  # deg; a number of radians that was meant is this near to a multiple of that
+# Below this restitution dashpots are so strong that friction exceeds Coulomb's where a load grows, see docs/theory.md.
+_STICKY = 0.3
 _TALLEST = 4.5  # heights of poured piles over their width [1]; those of the shipped scenes with default walls reach 4.1
 
 
@@ -17,6 +19,12 @@ def doubts_of(scene: Scene) -> Iterator[str]:
     """Yield a warning for each value of a scene that is probably a mistake: key, value, what to do."""
     yield from _of_angles(scene)
     yield from filter(None, [scene.sections.overhang(scene.fidelity.rows)])
+    restitution = scene.contact.restitution
+    if restitution < _STICKY:
+        yield (
+            f"contact.restitution: at {restitution:g} tangential dashpots, which friction does not limit, may hold bodies "
+            f"that should slide, by more than twice Coulomb's limit; where friction matters use {_STICKY:g} or more"
+        )
     if scene.phases[0].pours and scene.container.height_m is None:
         radius = scene.container.radius_m
         slenderness = scene.loose_height / (2 * radius)

@@ -71,3 +71,10 @@ def test_a_pile_like_a_column_is_doubted_unless_the_wall_is_given() -> None:
     radius = float(lines[0].partition("use a radius of ")[2].partition(" ")[0])
     advised = small({**many, "container.radius_m": radius})
     assert advised.loose_height / (2 * radius) == pytest.approx(1, rel=0.1)
+
+
+@pytest.mark.parametrize(("restitution", "warned"), [(0.01, True), (0.29, True), (0.3, False), (0.7, False)])
+def test_friction_at_low_restitution_is_doubted(restitution: float, warned: bool) -> None:
+    lines = [line for line in warnings_of(small({"contact.restitution": restitution})) if "Coulomb" in line]
+    assert len(lines) == warned
+    assert all(line.startswith(f"contact.restitution: at {restitution:g} ") for line in lines)
