@@ -188,7 +188,19 @@ def _kinds(scene: SceneView, found: tuple[PosedBody, ...], file: str) -> Numbers
 
 
 def _reject_undetermined(model: Particle | Kind) -> None:
-    """Raise InputError if centre lines leave open how a flat body is turned about its length."""
+    """Raise InputError if centre lines leave open how a body is turned about its length, and this matters."""
+    if isinstance(model, Kind) and model.filament is not None and model.filament.curvature is not None:
+        raise InputError(
+            "file: centre lines leave open in which plane a filament prefers to be bent; leave out "
+            "particle.curvature_per_m, or pour"
+        )
+    if isinstance(model, Kind) and model.linkage is not None:
+        for joint in model.linkage.joints:
+            if len(joint.axes) == 3 and (any(joint.rest) or any(joint.poured)):
+                raise InputError(
+                    "file: centre lines leave open how links are turned about their length, on which joints of three "
+                    "axes with angles at rest or at the start depend; use joints of one or two axes, or pour"
+                )
     points = (model.bars.ends if isinstance(model, Kind) else model.boxes.vertices).reshape(-1, 3)
     rows = model.rows if isinstance(model, Kind) else model.chain.rows
     if rows > 1 and np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-9) < 2:

@@ -110,6 +110,7 @@ GRIP_COLUMNS = _columns(
     grip_distance_m="distance between the means of the centres of mass of what both grips hold; NaN without two grips",
     grip_fixed_count="smarticles that the grip that rests holds",
     grip_moved_count="smarticles that the grip that moves holds",
+    grip_moved_weight_N="weight of the smarticles that the grip that moves holds; NaN while nothing is gripped",
 )
 # In scenes that take the container away.
 RELEASE_COLUMNS = _columns(

@@ -140,6 +140,7 @@ class Sampler:
         forces = self._mean_since("grips", engine.steps, grips.sums) + grips.weights[:, None] * up
         pull = forces.sum(axis=0) - grips.weights.sum() * up
         row |= {"grip_moved_force_N": forces[-1], "grip_moved_count": grips.counts[-1]}
+        row["grip_moved_weight_N"] = grips.weights[-1]
         if len(forces) == 1:
             return row | {"grip_fixed_force_N": np.zeros(3), "elongation_m": math.hypot(*moved[0])}, pull
         row |= {"grip_fixed_force_N": forces[-2], "grip_fixed_count": grips.counts[-2]}

@@ -32,6 +32,13 @@ def body_volumes(frame: Frame, run: Run) -> Floats:
     return np.array([kind.volume_m3 for kind in run.manifest.kinds])[frame.kind]
 
 
+def body_masses(frame: Frame, run: Run) -> Floats:
+    """Return the masses (N,) [kg] of all bodies."""
+    if run.manifest.kinds is None:
+        return np.full(frame.count, run.manifest.smarticle_mass_kg)
+    return np.array([kind.mass_kg for kind in run.manifest.kinds])[frame.kind]
+
+
 def segment_volumes(frame: Frame, run: Run) -> Floats:
     """Return the solid volumes (M,) [m³] of all segments of a frame whose bodies are no smarticles."""
     areas = [

@@ -4,7 +4,8 @@ The pull is the force with which other bodies, floor and wall hold back the bodi
 resting grip is their force on its bodies, in the direction in which the other grip moves; along z it includes the push
 of the floor. The strain is the elongation over the distance between the grips at the beginning, each at the mean of the
 centres of mass of its bodies. What a grip has picked up is the mass whose weight it bears, gripped bodies included; as
-a number of bodies, it is divided by the mean mass of one. In a mixture gripped bodies count with that mean mass.
+a number of bodies, it is divided by the mean mass of one. In runs that do not record the weight of gripped bodies, made
+before the column `grip_moved_weight_N`, they count with the mean mass.
 """
 
 from dataclasses import dataclass
@@ -76,9 +77,11 @@ def _of_lift(run: Run, series: Series, phase: int) -> tuple[float, ...]:
     inside = inside[np.isfinite(series["grip_moved_force_N"][inside, 2])]
     last = inside[series.time[inside] > series.time[inside[-1]] - END]
     gripped = float(series["grip_moved_count"][last[-1]])
-    picked = gripped - float(series["grip_moved_force_N"][last, 2].mean()) / weight_of_one(run)
-    mass = run.manifest.smarticle_mass_kg
-    return gripped, gripped * mass, picked, picked * mass
+    one, mass = weight_of_one(run), run.manifest.smarticle_mass_kg
+    recorded = "grip_moved_weight_N" in series.data
+    weight = float(series["grip_moved_weight_N"][last[-1]]) if recorded else gripped * one
+    picked = (weight - float(series["grip_moved_force_N"][last, 2].mean())) / one
+    return gripped, weight / one * mass, picked, picked * mass
 
 
 MEASURES = (

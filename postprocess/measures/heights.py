@@ -9,7 +9,7 @@ from dem.errors import InputError
 from dem.record.frame import Frame
 from dem.record.packing import second_highest
 from dem.record.run import Run
-from postprocess.geometry.bars import body_centres, body_volumes, segment_volumes
+from postprocess.geometry.bars import body_centres, body_masses, segment_volumes
 from postprocess.geometry.links import (
     Floats,
     UndefinedMeasureError,
@@ -103,7 +103,7 @@ def frame_heights(frame: Frame, run: Run) -> Heights:
         return heights(frame.vertices, floor_z=frame.floor_z)
     com = body_centres(frame)[:, 2] - frame.floor_z
     return Heights(
-        mean_com=float(np.average(com, weights=body_volumes(frame, run))),
+        mean_com=float(np.average(com, weights=body_masses(frame, run))),
         second_highest_com=second_highest(com),
         top=_filled_height(frame.segments[..., 2].T - frame.floor_z, segment_volumes(frame, run), 95.0),
     )

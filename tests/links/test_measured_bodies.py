@@ -1,5 +1,7 @@
 """Measures of bodies of any shape, in frames of a run on links."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scenes import small
@@ -10,6 +12,7 @@ from postprocess import measure_run, polygon_crossings, segments_of
 from postprocess.geometry.segments import curves
 from postprocess.measures.caging import contact_normals
 from postprocess.measures.contacts import strands_of
+from postprocess.measures.heights import frame_heights
 
 KINDS = {
     "rod": {"length_m": 0.014},
@@ -55,3 +58,18 @@ def test_recorded_shapes_are_curves_or_say_why_not(run: Run) -> None:
     assert table["average crossing number mean [-]"] > table["closed linking number mean [-]"]
     assert 0 <= table["caged [-]"] <= table["caged against translation [-]"] <= 1
     assert table["polar order of mouths [-]"] < 1
+
+
+def test_the_centre_of_mass_of_light_and_heavy_bodies_is_where_the_energy_says(tmp_path: Path) -> None:
+    particle = [
+        {"shape": "rod", "length_m": 0.008, "diameter_m": 2e-3, "density_kg_per_m3": 20000, "count": 3},
+        {"shape": "cross", "arm_m": 0.006, "diameter_m": 1e-3, "density_kg_per_m3": 500, "count": 5},
+    ]
+    phases = [{"type": "deposit", "per_layer": 4}, {"type": "relax", "duration_s": 0.02}]
+    scene = {"engine": "links", "fidelity": "draft", "count": 8, "particle": particle, "phases": phases}
+    run_scene(small(scene | {"container.radius_m": 0.015, "recording.energy": True}), tmp_path / "run", command="")
+    run = Run(tmp_path / "run")
+    frame, series = run.frames[-1], run.series
+    weight = 9.81 * frame.bodies.mass_kg.sum()
+    energy = series["gravitational_energy_J"][series.nearest(frame.time)]
+    assert frame_heights(frame, run).mean_com == pytest.approx(energy / weight, rel=1e-6)

@@ -193,6 +193,24 @@ def test_flat_straight_bodies_of_several_strands_are_not_determined(tmp_path: Pa
     assert re.search(message, refused(tmp_path, particle=flat, fidelity={"base": "draft", "rows": 2}))
 
 
+def test_bodies_whose_links_may_be_turned_about_their_length_are_not_determined(tmp_path: Path) -> None:
+    write(tmp_path, moved((0, 5, 0)))
+    worm = {"shape": "filament", "length_m": 0.01, "segments": 5, "diameter_m": 1e-3, "young_modulus_Pa": 1e5}
+    assert "in which plane a filament prefers" in refused(tmp_path, particle={**worm, "curvature_per_m": 60})
+    for joints in (
+        {"law": "elastic", "axes": 3, "stiffness_N_m_per_rad": 1e-3, "rest_angle_deg": [30, 20, 40]},
+        {
+            "law": "motor",
+            "axes": 3,
+            "stiffness_N_m_per_rad": 1e-3,
+            "torque_limit_N_m": 1e-3,
+            "poured_deg": [30, 20, 40],
+        },
+    ):
+        chain = {"shape": "chain", "links": 2, "link_m": 0.005, "diameter_m": 1e-3, "joints": joints}
+        assert "how links are turned about their length" in refused(tmp_path, particle=chain)
+
+
 def test_closed_bodies_that_are_linked_are_accepted_and_named(tmp_path: Path) -> None:
     square = np.array([[5, 5, 0], [-5, 5, 0], [-5, -5, 0], [5, -5, 0], [5, 5, 0]])
     ring = {

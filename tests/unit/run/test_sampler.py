@@ -122,6 +122,7 @@ def test_forces_on_grips_are_means_since_these_grips_hold() -> None:
     row = sample(sampler, engine)
     assert row["grip_fixed_force_N"] == pytest.approx([0, 0, 0.5])
     assert row["grip_moved_force_N"] == pytest.approx([0.1, 0, -0.7])
+    assert row["grip_moved_weight_N"] == pytest.approx(grips.weights[1])
     assert row["elongation_m"] == row["grip_distance_m"] == pytest.approx(5e-3)
     assert row["container_force_N"] == pytest.approx([-0.1, 0, 0.2 - engine.particle.boxes.mass * 9.81])
     # Others that hold within one interval are others, however many.

@@ -99,4 +99,16 @@ def test_what_hangs_on_a_grip_is_picked_up() -> None:
     assert values(grips.MEASURES[1], run, series) == pytest.approx(
         {"gripped": 3.0, "gripped mass": 3 * MASS, "picked up": 8.0, "picked up mass": 8 * MASS}
     )
+    # Three light ones of a mixture: their own weight is recorded.
+    light = np.full(n, 0.5 * MASS * GRAVITY)
+    run, series = read(
+        {},
+        grip_moved_force_N=forces,
+        grip_moved_count=np.full(n, 3),
+        grip_moved_weight_N=light,
+        elongation_m=elongations,
+    )
+    assert values(grips.MEASURES[1], run, series) == pytest.approx(
+        {"gripped": 3.0, "gripped mass": 0.5 * MASS, "picked up": 5.5, "picked up mass": 5.5 * MASS}
+    )
     assert not grips.has_grips(series, 0)
