@@ -222,6 +222,7 @@ class GripsDouble:
     calls: Calls
     stiffness: float = 0.0
     sums: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    pushed: Array = field(default_factory=lambda: np.zeros((0, 3)))
     moved: Array = field(default_factory=lambda: np.zeros((0, 3)))
     held: list[list[int]] = field(default_factory=list)
     _speeds: Array = field(default_factory=lambda: np.zeros((0, 3)))
@@ -245,8 +246,8 @@ class GripsDouble:
     def hold(self, bodies: Sequence[int]) -> int:
         self.calls.append(("hold", *bodies))
         self.held.append(list(bodies))
-        self.sums, self.moved, self._speeds = (
-            np.append(each, np.zeros((1, 3)), axis=0) for each in (self.sums, self.moved, self._speeds)
+        self.sums, self.pushed, self.moved, self._speeds = (
+            np.append(each, np.zeros((1, 3)), axis=0) for each in (self.sums, self.pushed, self.moved, self._speeds)
         )
         return len(self.held) - 1
 
@@ -257,7 +258,7 @@ class GripsDouble:
     def release(self) -> None:
         self.calls.append(("release",))
         self.held = []
-        self.sums = self.moved = self._speeds = np.zeros((0, 3))
+        self.sums = self.pushed = self.moved = self._speeds = np.zeros((0, 3))
 
     def step(self, dt: float) -> None:
         """Go on by dt [s]."""
@@ -265,6 +266,7 @@ class GripsDouble:
             self.moved = self.moved + self._speeds * dt
             pull = self.stiffness * float(self.moved[1, 2] - self.moved[0, 2])
             self.sums = self.sums + np.array([[0.0, 0.0, pull], [0.0, 0.0, -pull]])
+            self.pushed = self.pushed + np.array([[0.0, 0.0, pull], [0.0, 0.0, -pull]])
 
 
 @dataclass

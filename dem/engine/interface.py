@@ -290,7 +290,11 @@ class Grips(Protocol):
 
     @property
     def sums(self) -> Array:
-        """(G, 3) forces on the grips with the weight of what they hold [N], summed over all steps since `hold`."""
+        """(G, 3) forces on the grips, with weight and inertia of what they hold [N], summed over all steps."""
+
+    @property
+    def pushed(self) -> Array:
+        """(G, 3) forces of contacts on what the grips hold [N], summed over all steps since `hold`."""
 
     @property
     def weights(self) -> Array:

@@ -128,7 +128,7 @@ class Tension(Part, Phase):
             memory.update(arrival=arrival, end=engine.time + self.duration_s, moving=True)
             self._check_from_now(memory, engine, grips)
         elif memory["moving"] and not time_left(engine, memory["due"]):
-            stop_at_limit(memory, engine, force_sum=self._force_sum(engine, grips), limit=limit)
+            stop_at_limit(memory, engine, force_sum=self._force_sum(grips), limit=limit)
             self._check_from_now(memory, engine, grips)
         if memory["moving"] and (left := travel_left(memory, engine, limit=limit)):
             return left
@@ -151,12 +151,11 @@ class Tension(Part, Phase):
 
     def _check_from_now(self, memory: Memory, engine: Engine, grips: Grips) -> None:
         interval = self.whole_periods(CHECK_INTERVAL)
-        check_from_now(memory, engine, force_sum=self._force_sum(engine, grips), interval=interval)
+        check_from_now(memory, engine, force_sum=self._force_sum(grips), interval=interval)
 
-    def _force_sum(self, engine: Engine, grips: Grips) -> float:
-        """Return the force on the moving grip along the axis, without weight, summed over all steps [N]."""
-        weight = float(grips.weights[MOVED]) if self.axis == "z" else 0.0
-        return float(grips.sums[MOVED, self._along]) + weight * engine.steps
+    def _force_sum(self, grips: Grips) -> float:
+        """Return the force of contacts on what the moving grip holds, along the axis, summed over all steps [N]."""
+        return float(grips.pushed[MOVED, self._along])
 
     def _ends(self, stage: Stage, engine: Engine) -> tuple[list[int], list[int]]:
         """Return the numbers of the bodies at the end that rests and at the end that moves."""

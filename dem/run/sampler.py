@@ -136,9 +136,9 @@ class Sampler:
         if self.memory["grips_made"] != grips.made:  # sums begin anew
             self.memory.update(grips=None, grips_made=grips.made)
         # The last grip moves; the one before it rests, if there is one.
-        moved, up = grips.moved, np.array([0.0, 0.0, 1.0])
-        forces = self._mean_since("grips", engine.steps, grips.sums) + grips.weights[:, None] * up
-        pull = forces.sum(axis=0) - grips.weights.sum() * up
+        moved, sums = grips.moved, np.stack([grips.sums, grips.pushed])
+        pulls, forces = self._mean_since("grips", engine.steps, sums)
+        pull = pulls.sum(axis=0)
         row |= {"grip_moved_force_N": forces[-1], "grip_moved_count": grips.counts[-1]}
         row["grip_moved_weight_N"] = grips.weights[-1]
         if len(forces) == 1:

@@ -115,6 +115,7 @@ def test_grips_feel_a_contact_and_move_what_they_hold_exactly() -> None:
     assert made.grips.counts.tolist() == [1, 1]
     assert force[high, 2] == pytest.approx(STIFFNESS * (pressed - 1e-3 * DT), rel=1e-3)
     assert force[low] == pytest.approx(-force[high])
+    assert made.grips.pushed == pytest.approx(made.grips.sums + np.array([[0, 0, 0], [0, 0, -MASS * 1e-3 / DT]]))
     state = made.state()
     np.testing.assert_allclose(state.positions[:, 2], [0.5, 0.5 + 2 * RADIUS - pressed], rtol=1e-12)
     assert made.ledger.container_work == pytest.approx(made.ledger.elastic()[0] + state.kinetic_energy, rel=1e-2)
@@ -132,6 +133,7 @@ def test_a_grip_carries_weight_and_its_work_is_the_gain_of_energy() -> None:
     assert made.grips.weights == pytest.approx([MASS * G])
     # Weight, and the impulse of the start, which is spread over all steps.
     assert made.grips.sums[0] / 1000 == pytest.approx([-MASS * 0.1 / 0.02, 0, -MASS * (G + 0.2 / 0.02)], rel=1e-9)
+    assert not made.grips.pushed.any()  # nothing touches what it holds
     state = made.state()
     stored = state.kinetic_energy + state.potential_energy(G, 0.0)
     assert made.ledger.given == pytest.approx(stored, rel=1e-4)

@@ -276,11 +276,12 @@ class Grips(NamedTuple):
     moved: Array  #: (G, 3) ways at these velocities [m]
     force: Array  #: (G, 3) forces on the grips in the last step, with the weight of what they hold [N]
     sums: Array  #: (G, 3) these forces, summed over all steps [N]
+    pushed: Array  #: (G, 3) forces of contacts alone on what they hold, summed over all steps [N]
     rides: Array  #: (1,) 1 where grips are shaken with the floor, else 0
     made: NDArray[np.int64]  #: (1,) number of grips since the start
 
 
-PER_GRIP = ("speed", "moved", "force", "sums")  # fields of `Grips` with a row for each grip
+PER_GRIP = ("speed", "moved", "force", "sums", "pushed")  # fields of `Grips` with a row for each grip
 
 
 class Linkages(NamedTuple):

@@ -48,6 +48,10 @@ class LinksGrips:
         return self._all.sums.copy()
 
     @property
+    def pushed(self) -> Array:
+        return self._all.pushed.copy()
+
+    @property
     def moved(self) -> Array:
         return self._all.moved.copy()
 

@@ -387,9 +387,8 @@ class World:
     def allow_grips(self) -> None:
         """Let grips hold bodies later; must be called before bodies are added."""
         none = np.zeros((0, 3))
-        self.grips = Grips(
-            np.zeros(0, np.int64), none, none.copy(), none.copy(), none.copy(), np.zeros(1), np.zeros(1, np.int64)
-        )
+        rows = none, none.copy(), none.copy(), none.copy(), none.copy()
+        self.grips = Grips(np.zeros(0, np.int64), *rows, np.zeros(1), np.zeros(1, np.int64))
 
     def remove_plate(self) -> None:
         """Remove the plate and the memory of contacts with it."""

@@ -25,7 +25,7 @@ def hold(
     """Give held bodies the velocity of their grip instead of a kick, and return the work of all grips [J].
 
     Args:
-        grips: `force` and `sums` are written; None: nothing is held.
+        grips: `force`, `sums` and `pushed` are written; None: nothing is held.
         bodies: `velocity` and `momentum` of held bodies are written.
         acting: time for which the forces in `bodies.load` act [s].
         weight: length of the sub-step over that of a step [1].
@@ -45,6 +45,7 @@ def hold(
         turning = along(vector(bodies.momentum[i], 0), acting, vector(bodies.load[i], 3))
         work += 0.5 * (dot(impulse, add(before, after)) - dot(turning, vector(bodies.spin[i], 0)))
         put_more(grips.force[k], 0, scale(-1.0 / acting, impulse))
+        put_more(grips.pushed[k], 0, scale(weight, vector(bodies.load[i], 0)))
         put(bodies.velocity[i], 0, after)
         put(bodies.momentum[i], 0, (0.0, 0.0, 0.0))
     for k in range(grips.force.shape[0]):
