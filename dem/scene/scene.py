@@ -26,6 +26,7 @@ from dem.errors import InputError, nearest, shown
 from dem.notebook import Facts, Shown, bodies_text
 from dem.phases.deposit import Deposit
 from dem.phases.kinds import AnyPhase
+from dem.phases.phase import Settle
 from dem.phases.pull_hook import with_pull_defaults
 from dem.phases.take_over import TakeOver
 from dem.scene.keys import put
@@ -53,6 +54,7 @@ SMOOTH_PITCH = 0.35
 SCHEMA_VERSION: Literal[2] = 2
 ENGINE_OF_VERSION_1 = "yade"
 P = TypeVar("P", bound=Part)
+_TURNS = 10  # times in which a body turns back, for which a pile must at least be still
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
 
 
@@ -301,9 +303,11 @@ class Scene(Part, Shown):
             ratio = _usual_torque(self.smarticle, gravity) / _usual_torque(paper, EARTH_GRAVITY)
             vars(self)["motor"] = _scaled(self.motor, "stiffness_N_m_per_rad", ratio)
         root = math.sqrt(gravity * _sizes(dict(self))[0] / (EARTH_GRAVITY * paper.middle_length_m))
-        longer = root * EARTH_GRAVITY / gravity  # times go with √(w/g)
+        usual = Settle()
+        turn = 2 * root * usual.speed_m_per_s / gravity  # time for which a body that turns back is slower
+        longer = max(1.0, _TURNS * turn / usual.hold_s)
         vars(self)["phases"] = tuple(
-            _filled(phase, settle=_scaled(_scaled(phase.settle, "speed_m_per_s", root), "hold_s", max(1.0, longer)))
+            _filled(phase, settle=_scaled(_scaled(phase.settle, "speed_m_per_s", root), "hold_s", longer))
             if isinstance(phase, Deposit | TakeOver)
             else phase
             for phase in self.phases
