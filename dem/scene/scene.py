@@ -58,13 +58,14 @@ _TURNS = 10  # times in which a body turns back, for which a pile must at least 
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
 
 
-def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping[str, Any]:
+def _named(base: str, given: Mapping[str, Any], *, diameter: Any = None, pitch: Any = None) -> Mapping[str, Any]:
     """Return the parameters of a named fidelity by key of `Fidelity`, adapted to a scene.
 
     On the engine links `rows` is 1 in a plane, for t1 ≤ t2, and if a sphere diameter is given. Several rows become as
     many as leave no hole, see `dem.scene.strands`.
 
-    `given` are parts of the scene that are validated already, by name; `diameter` is `fidelity.diameter_m` or None.
+    `given` are parts of the scene that are validated already, by name; `diameter` and `pitch` are `fidelity.diameter_m`
+    and `fidelity.pitch`, which may not be validated, or None.
     """
     engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
     named = fidelities(engine)[base]
@@ -74,7 +75,8 @@ def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping
         return {**named, "rows": 1}
     if named["rows"] == 1:
         return named
-    least = _sections(given, None).rows(smooth=engine == "links", pitch=named["pitch"])
+    width, spacing = (each if isinstance(each, int | float) else None for each in (diameter, pitch))
+    least = _sections(given, width).rows(smooth=engine == "links", pitch=spacing or named["pitch"])
     return {**named, "rows": min(max(named["rows"], least), MOST_ROWS)}
 
 
@@ -227,7 +229,11 @@ class Scene(Part, Shown):
         base = value.get("base", "standard")
         if not isinstance(base, str) or base not in FIDELITIES:
             raise ValueError(f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}")
-        return {"base": base, **_named(base, info.data, value.get("diameter_m")), **value}
+        return {
+            "base": base,
+            **_named(base, info.data, diameter=value.get("diameter_m"), pitch=value.get("pitch")),
+            **value,
+        }
 
     @field_validator("container", mode="before")
     @classmethod
@@ -364,7 +370,8 @@ class Scene(Part, Shown):
     @property
     def named_knobs(self) -> Mapping[str, Any]:
         """Parameters of the named fidelity for this scene, before the scene or a rule changes them."""
-        return _named(self.fidelity.base, dict(self), self.fidelity.diameter_m)
+        fidelity = self.fidelity
+        return _named(fidelity.base, dict(self), diameter=fidelity.diameter_m, pitch=fidelity.pitch)
 
     @property
     def smooth(self) -> bool:
