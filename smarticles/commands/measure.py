@@ -252,7 +252,7 @@ def _without_frames(table: pd.DataFrame) -> list[str]:
                 found.setdefault((phase.index, phase.type), []).append(run.path)
     return [
         f"{runs[0]}{f' and {len(runs) - 1} more' if runs[1:] else ''}: phase {index} ({kind}) has no frame, and so "
-        "no means; run it anew, since each phase now ends with a frame"
+        "no means; run it anew, since each phase ends with a frame"
         for (index, kind), runs in sorted(found.items())
     ]
 
