@@ -160,6 +160,7 @@ def test_grips_that_hold_everything_fail_with_the_length_that_does_not() -> None
     scene = with_phase({"type": "remove-container"}, {**TENSION, "axis": "x"})
     engine = standing(scene)
     engine.grips = GripsDouble(calls=engine.calls)
+    engine.boundaries.remove_wall()
     with pytest.raises(RunError, match=r"phases\.2\.grip_m: .* are within 0 m along x; use bodies instead"):
         carry_out(scene, engine, 2)
 
