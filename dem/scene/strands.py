@@ -22,8 +22,8 @@ from dem.body.particle import mean_width
 from dem.scene.stiffness import WANTED
 from dem.setting.fidelity import MOST_ROWS
 
-# Part of the room up to which a contact is linear: `LINEAR` of `dem.engine.links.contact.barrier`, whose import would load
-# Numba for every scene. `tests/links/test_strands.py` holds both functions together.
+# Part of the room up to which a contact is linear: `LINEAR` of `dem.engine.links.contact.barrier`, whose import would
+# load Numba for every scene. `tests/links/test_strands.py` holds both functions together.
 _LINEAR = 0.25
 
 
