@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dem.body.particle import LINKS, Boxes, Particle
-from dem.engine.links.shapes import offsets_of, planar_of, smarticle_shape
+from dem.engine.links.shapes import planar_of, smarticle_shape
 from postprocess.measures.contacts import segment_distances
 
 Array = NDArray[np.float64]
@@ -114,7 +114,7 @@ def _strands(particle: Particle, positions: Array, frames: Array) -> Swept:
     spans = {0: barb, 1: (-planar.end, planar.end), 2: barb}
     ends: tuple[list[Array], list[Array]] = ([], [])
     for link in np.unique(smarticle_shape(particle).link):
-        for offset in offsets_of(particle):
+        for offset in particle.offsets:
             for kept, along in zip(ends, spans[int(link)], strict=True):
                 kept.append(positions[:, link] + along * frames[:, link, :, 0] + offset * frames[:, link, :, 2])
     starts, stops = (np.concatenate(kept) for kept in ends)

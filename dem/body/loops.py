@@ -55,7 +55,8 @@ def loops_of(body: Body, *, thinnest: float = 0.0) -> list[Loop]:
     if body.filament is not None or body.linkage is not None:
         return []
     segments = bars_of(body)
-    segments = segments[np.abs(segments[:, 1] - segments[:, 0]).max(axis=1) > 0]  # barbs may have no length
+    (numbers,) = np.nonzero(np.abs(segments[:, 1] - segments[:, 0]).max(axis=1) > 0)  # barbs may have no length
+    segments = segments[numbers]
     nodes = first_ends(segments).reshape(-1, 2)
     free = np.bincount(nodes.ravel(), minlength=nodes.size)[nodes] == 1
     # Axes of swept bars begin and end a radius within free ends.
@@ -69,7 +70,7 @@ def loops_of(body: Body, *, thinnest: float = 0.0) -> list[Loop]:
         edges += [(tip, len(places)), (len(places), int(nodes[bar, 0]))]
         places.append((bar, share))
     return [
-        Loop(np.array([places[k][0] for k in cycle]), np.array([places[k][1] for k in cycle]))
+        Loop(numbers[[places[k][0] for k in cycle]], np.array([places[k][1] for k in cycle]))
         for cycle in _cycles(edges, len(places))
     ]
 

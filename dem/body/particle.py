@@ -268,8 +268,8 @@ class Particle:
         """None: hinges are those of barbs."""
 
     @cached_property
-    def _rows(self) -> Array:
-        """(rows,) [m]: offsets of the rows of spheres along the normal; outermost spheres reach to ±t1/2."""
+    def offsets(self) -> Array:
+        """(rows,) offsets of the rows of spheres, or strands, along the normal [m]; the outermost reach to ±t1/2."""
         if self.chain.rows == 1:
             return np.zeros(1)
         reach = (self.boxes.thickness_normal - self.chain.diameter) / 2
@@ -324,7 +324,7 @@ class Particle:
         for link in range(LINKS):
             # Across the middle link is y.
             sides = self._sides if link == 1 else np.zeros(1)
-            for station, side, offset in product(self._stations(link), sides, self._rows):
+            for station, side, offset in product(self._stations(link), sides, self.offsets):
                 centre = starts[link] + station * self.boxes.directions[link]
                 centres.append(centre + np.array([0.0, side, offset]))
                 links.append(link)
@@ -360,7 +360,7 @@ class Particle:
     @property
     def spread(self) -> float:
         """Distance of the outermost rows of spheres from a link's axis, along the normal [m]."""
-        return float(self._rows[-1])
+        return float(self.offsets[-1])
 
     @property
     def breadth(self) -> float:

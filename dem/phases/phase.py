@@ -274,7 +274,7 @@ class Settle(Part):
         0.05,
         ge=0,
         le=1e6,
-        description="time for which both limits must hold [s]; the default is at least 1.45 √(w/g), 12 times as "
+        description="time for which both limits must hold [s]; the default is at least 1.18 √(w/g), 10 times as "
         "long as a body that turns back is slower than the default speed, with w as there",
     )
     timeout_s: Duration = Field(

@@ -165,10 +165,10 @@ class Tension(Part, Phase):
         places = engine.state().positions[:, self._along]
         low, high = float(places.min()), float(places.max())
         if high - low <= 2 * self.grip_m:
+            less = f"use less than {rounded_down((high - low) / 2)} m" if high > low else "use bodies instead"
             raise RunError(
                 f"phases.{stage.index}.grip_m: grips of {self.grip_m:g} m at both ends hold the whole pile, whose "
-                f"centres are within {high - low:.3g} m along {self.axis}; use less than "
-                f"{rounded_down((high - low) / 2)} m"
+                f"centres are within {high - low:.3g} m along {self.axis}; {less}"
             )
         ends = places <= low + self.grip_m, places >= high - self.grip_m
         return np.flatnonzero(ends[0]).tolist(), np.flatnonzero(ends[1]).tolist()

@@ -120,7 +120,7 @@ def _resolved(scene: Scene, index: int, step: float) -> tuple[float, Span | None
                 raise InputError(
                     f"fidelity.time_step_s: {given:g} s makes {span.seconds / step:.3g} time steps in the "
                     f"{span.seconds:.3g} s of {span.key} ({span.value}), and {span.steps} resolve it; use at most "
-                    f"{0.995 * span.longest_step:.3g} s or leave it out"
+                    f"{rounded_down(span.longest_step)} s or leave it out"
                 )
             interval = scene.fidelity.control_interval_s if phase.actuates else scene.recording.series_interval_s
             step, limit = interval / _steps_in(interval, span.longest_step), span

@@ -185,8 +185,7 @@ class Watchdog:
         limit = self.missed * dissipated + (self.energy if math.isfinite(self.energy) else 0.0)
         if not abs(residual) > WARNED_FRACTION * limit > 0.0:
             return None
-        share = 100 * abs(residual) / dissipated if dissipated else math.inf
-        text = f"the energy ledger misses {residual:.3g} J, {share:.2g} % of the {dissipated:.3g} J dissipated"
+        text = f"the energy ledger misses {residual:.3g} J, with {dissipated:.3g} J dissipated"
         if abs(residual) > limit:
-            raise RunError(f"at t = {time:.4f} s {text} (limit {100 * self.missed:.2g} %); {LOWER_STEP}")
+            raise RunError(f"at t = {time:.4f} s {text} (limit {limit:.3g} J); {LOWER_STEP}")
         return f"{text}; {LOWER_STEP}"

@@ -26,6 +26,7 @@ from dem.errors import InputError, nearest, shown
 from dem.notebook import Facts, Shown, bodies_text
 from dem.phases.deposit import Deposit
 from dem.phases.kinds import AnyPhase
+from dem.phases.phase import Settle
 from dem.phases.pull_hook import with_pull_defaults
 from dem.phases.take_over import TakeOver
 from dem.scene.keys import put
@@ -53,16 +54,18 @@ SMOOTH_PITCH = 0.35
 SCHEMA_VERSION: Literal[2] = 2
 ENGINE_OF_VERSION_1 = "yade"
 P = TypeVar("P", bound=Part)
+_TURNS = 10  # times in which a body turns back, for which a pile must at least be still
 _LEAST_GRAVITY = 1e-6  # m/s²; below it motors, whose torque limit is proportional to gravity, cannot move anything
 
 
-def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping[str, Any]:
+def _named(base: str, given: Mapping[str, Any], *, diameter: Any = None, pitch: Any = None) -> Mapping[str, Any]:
     """Return the parameters of a named fidelity by key of `Fidelity`, adapted to a scene.
 
     On the engine links `rows` is 1 in a plane, for t1 ≤ t2, and if a sphere diameter is given. Several rows become as
     many as leave no hole, see `dem.scene.strands`.
 
-    `given` are parts of the scene that are validated already, by name; `diameter` is `fidelity.diameter_m` or None.
+    `given` are parts of the scene that are validated already, by name; `diameter` and `pitch` are `fidelity.diameter_m`
+    and `fidelity.pitch`, which may not be validated, or None.
     """
     engine, smarticle = given.get("engine", ""), given.get("smarticle") or Smarticle()
     named = fidelities(engine)[base]
@@ -72,7 +75,8 @@ def _named(base: str, given: Mapping[str, Any], diameter: Any = None) -> Mapping
         return {**named, "rows": 1}
     if named["rows"] == 1:
         return named
-    least = _sections(given, None).rows(smooth=engine == "links", pitch=named["pitch"])
+    width, spacing = (each if isinstance(each, int | float) else None for each in (diameter, pitch))
+    least = _sections(given, width).rows(smooth=engine == "links", pitch=spacing or named["pitch"])
     return {**named, "rows": min(max(named["rows"], least), MOST_ROWS)}
 
 
@@ -225,7 +229,11 @@ class Scene(Part, Shown):
         base = value.get("base", "standard")
         if not isinstance(base, str) or base not in FIDELITIES:
             raise ValueError(f"unknown fidelity {shown(base)}; {nearest(str(base), FIDELITIES)}")
-        return {"base": base, **_named(base, info.data, value.get("diameter_m")), **value}
+        return {
+            "base": base,
+            **_named(base, info.data, diameter=value.get("diameter_m"), pitch=value.get("pitch")),
+            **value,
+        }
 
     @field_validator("container", mode="before")
     @classmethod
@@ -301,9 +309,11 @@ class Scene(Part, Shown):
             ratio = _usual_torque(self.smarticle, gravity) / _usual_torque(paper, EARTH_GRAVITY)
             vars(self)["motor"] = _scaled(self.motor, "stiffness_N_m_per_rad", ratio)
         root = math.sqrt(gravity * _sizes(dict(self))[0] / (EARTH_GRAVITY * paper.middle_length_m))
-        longer = root * EARTH_GRAVITY / gravity  # times go with √(w/g)
+        usual = Settle()
+        turn = 2 * root * usual.speed_m_per_s / gravity  # time for which a body that turns back is slower
+        longer = max(1.0, _TURNS * turn / usual.hold_s)
         vars(self)["phases"] = tuple(
-            _filled(phase, settle=_scaled(_scaled(phase.settle, "speed_m_per_s", root), "hold_s", max(1.0, longer)))
+            _filled(phase, settle=_scaled(_scaled(phase.settle, "speed_m_per_s", root), "hold_s", longer))
             if isinstance(phase, Deposit | TakeOver)
             else phase
             for phase in self.phases
@@ -360,7 +370,8 @@ class Scene(Part, Shown):
     @property
     def named_knobs(self) -> Mapping[str, Any]:
         """Parameters of the named fidelity for this scene, before the scene or a rule changes them."""
-        return _named(self.fidelity.base, dict(self), self.fidelity.diameter_m)
+        fidelity = self.fidelity
+        return _named(fidelity.base, dict(self), diameter=fidelity.diameter_m, pitch=fidelity.pitch)
 
     @property
     def smooth(self) -> bool:

@@ -22,7 +22,9 @@ from dem.body.particle import mean_width
 from dem.scene.stiffness import WANTED
 from dem.setting.fidelity import MOST_ROWS
 
-_LINEAR = 0.25  # of the room, up to which a contact is linear, as `LINEAR` in `dem.engine.links.contact.barrier`
+# Part of the room up to which a contact is linear: `LINEAR` of `dem.engine.links.contact.barrier`, whose import would
+# load Numba for every scene. `tests/links/test_strands.py` holds both functions together.
+_LINEAR = 0.25
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,7 +9,9 @@ from dem.errors import InputError
 from dem.record.frames import FrameSequence
 from postprocess.geometry.links import Flags, Floats, Whole, centres_of_mass, floats
 
-_EVEN = 1e-3  # largest deviation of a time between frames, over their interval [1]
+# Largest deviation of a time between frames, over their interval [1]. Frames are at the nearest time steps; those of taps
+# divide no interval, so that times between frames differ by a step, 0.2 % of the usual interval.
+_EVEN = 0.01
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

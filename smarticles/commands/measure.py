@@ -245,14 +245,15 @@ def _without_frames(table: pd.DataFrame) -> list[str]:
     found: dict[tuple[int, str], list[Path]] = {}
     for name in table["run"][table[STATE] == DONE].unique():
         run = Run(Path(str(name)))
+        frames = run.frames
         for phase in run.phases:
             lasted = (phase.end_s or 0.0) - (phase.start_s or 0.0)
             # A phase of one time step, such as place, hardly changes the pile.
-            if lasted > 2 * run.manifest.time_step_s and not run.frames.in_phase(phase.index):
+            if lasted > 2 * run.manifest.time_step_s and not frames.in_phase(phase.index):
                 found.setdefault((phase.index, phase.type), []).append(run.path)
     return [
         f"{runs[0]}{f' and {len(runs) - 1} more' if runs[1:] else ''}: phase {index} ({kind}) has no frame, and so "
-        "no means; run it anew, since each phase now ends with a frame"
+        "no means; run it anew, since each phase ends with a frame"
         for (index, kind), runs in sorted(found.items())
     ]
 

@@ -224,7 +224,7 @@ class _Pile:
         asked, gives = [], np.zeros(len(met.depths))
         for body, sign in ((met.first, 1.0), (met.second, -1.0)):
             free = body >= 0
-            moments = _cross(met.places - self.positions[body], met.normals)
+            moments = np.cross(met.places - self.positions[body], met.normals)
             turning = matrix_product(inverse[body], moments[..., None])[..., 0]
             own = np.where(free, 1.0 + (moments * turning).sum(axis=1), 0.0)
             gives += own
@@ -283,7 +283,7 @@ def _nearest(p: Array, u: Array, q: Array, v: Array) -> _Near:
 
 def _edges_pass(one: _Faces, other: _Faces) -> Flags:
     """Return (P,) whether an edge of a link's face passes through the face of another link, pair by pair."""
-    normals = _cross(other.vectors, other.halves)
+    normals = np.cross(other.vectors, other.halves)
     lengths, widths = (np.maximum((x**2).sum(axis=1), 1e-300) for x in (other.vectors, other.halves))
     edges = [(one.starts + side * one.halves, one.vectors) for side in (-1.0, 1.0)]
     edges += [(one.starts + end * one.vectors - one.halves, 2 * one.halves) for end in (0.0, 1.0)]
@@ -324,12 +324,6 @@ def _met_along(one: _Faces, other: _Faces, near: _Near, depths: Array) -> _Met:
 def _touching(met: _Met) -> _Met:
     """Return the overlaps that are deeper than 0."""
     return _Met._make(values[met.depths > 0] for values in met)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Return the cross products of vectors (n, 3)."""
-    columns = [a[:, i] * b[:, j] - a[:, j] * b[:, i] for i, j in ((1, 2), (2, 0), (0, 1))]
-    return np.stack(columns, axis=1)
 
 
 def _turns_by(angles: Array) -> Array:

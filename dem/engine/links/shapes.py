@@ -134,7 +134,7 @@ def planar_of(particle: Particle) -> Planar:
 
 def smarticle_shape(particle: Particle) -> Shape:
     """Return the shape of a smarticle, with its barbs at their initial angles."""
-    boxes, planar, strands = particle.boxes, planar_of(particle), offsets_of(particle)
+    boxes, planar, strands = particle.boxes, planar_of(particle), particle.offsets
     directions, (x, y, _) = boxes.directions, boxes.plain_centre_of_mass
     axes = [(1, -planar.end, 2 * planar.end)]
     if boxes.barb_length > particle.radius:  # the tip of a shorter one is inside the sphere at the hinge
@@ -151,15 +151,6 @@ def smarticle_shape(particle: Particle) -> Shape:
         effective_mass=typical_effective_mass(particle),
         planar=planar,
     )
-
-
-def offsets_of(particle: Particle) -> Array:
-    """Return (S,) positions of a link's S strands along the normal, from the smarticle's mid-plane [m].
-
-    A single strand is in the mid-plane. Of several strands, the surfaces of the outer two reach the link's faces.
-    """
-    reach = (particle.boxes.thickness_normal - particle.chain.diameter) / 2
-    return np.zeros(1) if particle.chain.rows == 1 else np.linspace(-reach, reach, particle.chain.rows)
 
 
 def kind_shape(kind: Kind) -> Shape:

@@ -157,6 +157,12 @@ def test_a_held_grip_stops_at_its_limit(anew: bool) -> None:
 def test_grips_that_hold_everything_fail_with_the_length_that_does_not() -> None:
     with pytest.raises(RunError, match=r"phases\.1\.grip_m: .* are within 0\.09 m along z; use less than 0\.045 m"):
         pulled(10.0, grip_m=0.05)
+    scene = with_phase({"type": "remove-container"}, {**TENSION, "axis": "x"})
+    engine = standing(scene)
+    engine.grips = GripsDouble(calls=engine.calls)
+    engine.boundaries.remove_wall()
+    with pytest.raises(RunError, match=r"phases\.2\.grip_m: .* are within 0 m along x; use bodies instead"):
+        carry_out(scene, engine, 2)
 
 
 def test_a_lift_holds_rigid_bodies_until_they_are_released() -> None:

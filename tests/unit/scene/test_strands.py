@@ -53,6 +53,13 @@ def test_rows_of_spheres_leave_no_hole_for_a_sphere() -> None:
     assert scene("yade", fidelity="reference").body.chain.rows == 2
 
 
+@pytest.mark.parametrize(("own", "rows"), [({}, 2), ({"pitch": 1.35}, 3), ({"diameter_m": 4e-4}, 3)])
+def test_rows_of_spheres_follow_from_a_pitch_and_a_diameter_of_the_scene(own: dict[str, float], rows: int) -> None:
+    made = scene("yade", fidelity={"base": "reference", **own})
+    assert made.body.chain.rows == rows
+    time_steps(made)
+
+
 @pytest.mark.parametrize("fidelity", ["draft", "standard"])
 @pytest.mark.parametrize("diameter", [0.05e-3, 0.2e-3, 0.4e-3])
 def test_thin_chains_of_spheres_do_not_pass_between_spheres(fidelity: str, diameter: float) -> None:

@@ -214,7 +214,7 @@ def test_phases_of_older_runs_without_frames_keep_their_rows_and_are_named(
     said = smarticles("measure", *runs)
     note = f"note: {runs[0]} and 1 more: phase 1 (relax) has no frame, and so no means; run it anew"
     assert [line for line in said.out.splitlines() if line.startswith("note:")] == [
-        f"{note}, since each phase now ends with a frame"
+        f"{note}, since each phase ends with a frame"
     ]
     assert note in smarticles("measure", *runs, "--by", "seed").out
     assert "note:" not in smarticles("measure", runs[2]).out

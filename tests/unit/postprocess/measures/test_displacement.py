@@ -54,6 +54,15 @@ def test_what_is_neither_frames_nor_positions_is_rejected(make_run):
             mean_squared_displacement(given)
 
 
+def test_frames_at_the_nearest_steps_of_taps_are_at_equal_intervals():
+    step = 1 / 30 / 501  # of taps at 30 Hz; it does not divide the 0.04 s between frames
+    times = step * np.round(0.04 * np.arange(9) / step)
+    assert np.ptp(np.diff(times)) > 0.9 * step
+    places = np.outer(times, [1.0, 0.0, 0.0])[:, None]
+    found = mean_squared_displacement(places, times)
+    np.testing.assert_allclose(found.along_m2[1:, 0], found.times_s[1:] ** 2, rtol=4 * step / 0.04)
+
+
 @pytest.mark.parametrize(
     ("times", "words"),
     [
