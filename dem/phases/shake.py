@@ -274,6 +274,11 @@ def check_shaking(scene: SceneView, where: str, vibration: Vibration) -> Iterato
 def _of_amplitude(
     scene: SceneView, key: str, frequency: float, acceleration: float, *, floor_alone: bool
 ) -> Iterator[str]:
+    if acceleration and not scene.gravity_m_per_s2:
+        yield (
+            f"{key.rpartition('.')[0]}.peak_acceleration_g: Γ = {acceleration:g} is in units of gravity, and "
+            "gravity_m_per_s2 is 0, so that nothing would move; give a gravity, or leave the motion out"
+        )
     # The floor must not drop below the wall's lower edge.
     amplitude, depth = shaking_amplitude(acceleration, frequency, scene.gravity_m_per_s2), -scene.cylinder.bottom
     most = MOST_AMPLITUDE * scene.sphere_diameter

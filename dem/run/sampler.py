@@ -131,10 +131,12 @@ class Sampler:
         row: dict[str, Any] = dict.fromkeys(GRIP_COLUMNS, math.nan)
         row |= {"grip_fixed_force_N": none, "grip_moved_force_N": none, "grip_fixed_count": 0, "grip_moved_count": 0}
         if grips is None or not len(grips.counts):
-            self.memory["grips"] = None
+            self.memory["grips"] = [engine.steps, None]
             return row, none
-        if self.memory["grips_made"] != grips.made:  # sums begin anew
-            self.memory.update(grips=None, grips_made=grips.made)
+        previous = self.memory["grips"]
+        if previous is not None and self.memory["grips_made"] != grips.made:  # sums begin anew
+            self.memory.update(grips=[previous[0], np.zeros((2, len(grips.counts), 3)).tolist()])
+        self.memory["grips_made"] = grips.made
         # The last grip moves; the one before it rests, if there is one.
         moved, sums = grips.moved, np.stack([grips.sums, grips.pushed])
         pulls, forces = self._mean_since("grips", engine.steps, sums)

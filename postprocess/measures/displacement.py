@@ -9,8 +9,8 @@ from dem.errors import InputError
 from dem.record.frames import FrameSequence
 from postprocess.geometry.links import Flags, Floats, Whole, centres_of_mass, floats
 
-# Largest deviation of a time between frames, over their interval [1]. Frames are at the nearest time steps; those of taps
-# divide no interval, so that times between frames differ by a step, 0.2 % of the usual interval.
+# Largest deviation of a time between frames, over their interval [1]. Frames are at the nearest time steps; those of
+# taps divide no interval, so that times between frames differ by a step, 0.2 % of the usual interval.
 _EVEN = 0.01
 
 

@@ -211,6 +211,15 @@ def test_bodies_whose_links_may_be_turned_about_their_length_are_not_determined(
         assert "how links are turned about their length" in refused(tmp_path, particle=chain)
 
 
+def test_a_shake_without_gravity_would_not_move(tmp_path: Path) -> None:
+    write(tmp_path, moved((0, 5, 0)))
+    phases = [SCENE["phases"][0], {"type": "shake", "duration_s": 0.1, "frequency_hz": 40, "peak_acceleration_g": 3}]
+    assert scene(tmp_path, phases=phases)
+    assert refused(tmp_path, phases=phases, gravity_m_per_s2=0.0).startswith(
+        "phases.1.peak_acceleration_g: Γ = 3 is in"
+    )
+
+
 def test_closed_bodies_that_are_linked_are_accepted_and_named(tmp_path: Path) -> None:
     square = np.array([[5, 5, 0], [-5, 5, 0], [-5, -5, 0], [5, -5, 0], [5, 5, 0]])
     ring = {
