@@ -15,6 +15,7 @@ from dem.engine.effect import EffectName
 from dem.engine.interface import Engine
 from dem.engine.kinds import engine_kind
 from dem.phases.actuated import BARB_LINKS, MOST_OVERSHOOT, overshoot
+from dem.phases.pull_hook import PullHook
 from dem.plan.effects import called_for
 from dem.plan.steps import time_steps
 from dem.record.frames import FrameWriter, OneFileWriter
@@ -134,6 +135,7 @@ def build_watchdog(scene: Scene) -> Watchdog:
         way_out=DAMP_SHAFTS if _rings(scene) else LOWER_STEP,
         floats=scene.mixture is not None
         and any(kind.filament is not None and kind.filament.weight_share < 0 for kind in scene.mixture.kinds),
+        lifted=max(0.0 if isinstance(phase, PullHook) else phase.raises for phase in scene.phases),
         gap=(PIN_LIMIT if scene.mixture is not None and scene.mixture.jointed else GAP_LIMIT) * diameter,
         depth=(BARRIER_LIMIT if scene.smooth else DEPTH_LIMIT) * diameter,
         pressed=PRESSED * diameter if scene.smooth else math.inf,

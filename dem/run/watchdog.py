@@ -29,6 +29,7 @@ class Watchdog:
     speed: float  #: Largest speed of a link's centre [m/s]; falls, shaking and motors of the scene cause lower speeds
     way_out: str = LOWER_STEP  #: Advice where a speed is larger
     floats: bool = False  #: Whether bodies are lighter than the liquid around them, so that they rise without end
+    lifted: float = 0.0  #: Largest distance by which grips lift bodies, also above the wall [m]
     gap: float = math.inf  #: Largest gap of a hinge [m]; beyond it the hinge is broken
     depth: float = math.inf  #: Largest overlap [m]; beyond it contacts no longer keep bodies apart
     pressed: float = math.inf  #: Overlap [m] above which a run warns at its end: bodies stay apart, but are too soft
@@ -104,7 +105,7 @@ class Watchdog:
             corners = self.cylinder.radii(above - raised) * (self.cylinder.corner_radius / self.cylinder.radius)
             beyond = (np.hypot(points[..., 0], points[..., 1]) > corners) & (above < height)
             # The wall's upper edge holds nothing: what leans over it is on its way out.
-            out = (heights > height + raised) | (beyond.any(axis=1) & (above > height).any(axis=1))
+            out = (heights > height + max(raised, self.lifted)) | (beyond.any(axis=1) & (above > height).any(axis=1))
             outside |= beyond & ~out[:, None]
         reject(outside.any(axis=1), time, "left through the wall or the floor", "raise fidelity.stiffness_N_per_m")
         cause, way_out = "thrown out", "raise container.height_m, or shake or throw less"

@@ -113,3 +113,13 @@ def test_such_a_pile_chatters_at_steps_that_are_too_long(name: str) -> None:
 def test_strongly_damped_rods_of_unequal_thickness_come_to_rest() -> None:
     scene = mixed(THIN | {"count": 12}, THICK | {"count": 4}, **{"contact.restitution": 0.2})
     assert unbalanced_after_pour(scene, 1.0) < 0.04
+
+
+WIDE = {"shape": "rod", "length_m": 0.0146, "density_kg_per_m3": 2400, "count": 24}
+WIDE |= {"thickness_normal_m": 2.2e-3, "thickness_in_plane_m": 0.34e-3}
+
+
+@pytest.mark.parametrize(("factor", "chatters"), [(1.0, False), (1.8, True)])
+def test_wide_bars_that_lie_on_each_other_with_all_strands_come_to_rest(factor: float, chatters: bool) -> None:
+    scene = mixed(WIDE, fidelity="standard", seed=1, **{"container.radius_m": 0.017})
+    assert (unbalanced_after_pour(scene, factor) > 0.07) == chatters

@@ -34,6 +34,8 @@ Mode = tuple[Array, Array]  # stiffness and damping (k, k) of the degrees of fre
 CONTACTS_AT_A_TIP = 2
 # Bonds between neighbours that move against each other, above and below, each at twice the motion of one.
 AGAINST_NEIGHBOURS = 4
+# Strands up to which a bar counts as narrow: it does not lie on a neighbour with all strands at both ends at once.
+NARROW = 3
 SHAPES = 8  # angles that are tried where motors may turn the barbs, from straight to beyond the U
 WIDEST = math.radians(105.0)
 PRECISE = 1e-12  # of a step
@@ -135,6 +137,11 @@ def _step_of(
     rub = sum((matrix_product(push[:2].T, push[:2]) for push in top), np.zeros_like(mass))
     modes = [*_modes_of_end(law, tips), *_modes_of_pile(law, heave, rub)]
     modes += [(stiffness * tips, damping * tips) for stiffness, damping in strings]
+    if len(tip) > NARROW:
+        for link in range(3):
+            places = [place for of, place in ends if of == link]
+            face = [_motion_of(shape, row, link, place, free) for place in places]
+            modes += _modes_of_face(law, face, _in_grooves(np.array(places), radius))
     return _step_of_modes(mass, modes)
 
 
@@ -180,8 +187,9 @@ def rigid_stable_time_step(shape: Shape, law: ContactLaw, joints: Mode | None = 
     """Return the largest stable time step [s] over the stiffest modes of a rigid body among bodies.
 
     The modes are: an end of a bar, with all its strands (segments side by side), against another such end or against a
-    boundary; and a pile of bodies that lie on their broad side, with a contact at every end, in which neighbours above
-    and below move in opposite directions, across or along the broad side.
+    boundary; a bar of more than `NARROW` strands that lies on others with all strands at both ends; and a pile of
+    bodies that lie on their broad side, with a contact at every end, in which neighbours above and below move in
+    opposite directions, across or along the broad side.
 
     The stiffness and damping `joints` (6, 6) of a link's joints are added to each mode.
     """
@@ -191,17 +199,20 @@ def rigid_stable_time_step(shape: Shape, law: ContactLaw, joints: Mode | None = 
         for bit, place in ((AT_END, line[:3] + line[3:6]), (AT_START, line[:3])):
             if not shared & bit:
                 places.setdefault((int(link), bit), []).append(place)
-    ends = list(places.values())
+    ends, radius = list(places.values()), float(shape.lines[:, RADIUS].max())
     modes: list[Mode] = []
     for strands in ends:
         tips = sum((matrix_product(push.T, push) for push in map(_motion, strands)), np.zeros((6, 6)))
         modes += _modes_of_end(law, tips)
+    for link in {link for (link, _), strands in places.items() if len(strands) > NARROW}:
+        face = [place for (of, _), strands in places.items() if of == link for place in strands]
+        modes += _modes_of_face(law, [_motion(place) for place in face], _in_grooves(np.array(face), radius))
     # The broad side is across the axis along which the bars reach least: strands lie one above the other there.
     spread = np.ptp([np.mean(strands, axis=0) for strands in ends], axis=0)
     within = np.sum([np.ptp(strands, axis=0) for strands in ends], axis=0)
     up = int(np.lexsort((-within, np.round(spread / (spread.max() + 1e-30), 6)))[0])
     across = [axis for axis in range(3) if axis != up]
-    radius, heave, rub = float(shape.lines[:, RADIUS].max()), np.zeros((6, 6)), np.zeros((6, 6))
+    heave, rub = np.zeros((6, 6)), np.zeros((6, 6))
     for strands in ends:
         top = max(strands, key=lambda place: float(place[up])) + radius * np.eye(3)[up]
         push = _motion(top)
@@ -224,6 +235,25 @@ def _modes_of_end(law: ContactLaw, tips: Array) -> list[Mode]:
         (2 * CONTACTS_AT_A_TIP * kn * tips, 2 * CONTACTS_AT_A_TIP * cn * tips),
         (CONTACTS_AT_A_TIP * kn * tips, CONTACTS_AT_A_TIP * cw * tips),
     ]
+
+
+def _modes_of_face(law: ContactLaw, pushes: Sequence[Array], stiffer: float) -> list[Mode]:
+    """Return the modes of a bar that lies on others with all strands at both ends, `stiffer` times as stiff as one end.
+
+    `pushes` are the matrices from the k velocities of the body to the velocity of each strand's end.
+    """
+    both = sum((matrix_product(push.T, push) for push in pushes), np.zeros((pushes[0].shape[1],) * 2))
+    return [(stiffer * stiffness, stiffer * damping) for stiffness, damping in _modes_of_end(law, both)]
+
+
+def _in_grooves(places: Array, radius: float) -> float:
+    """Return how many times as stiff strands are that lie between two strands of another bar, instead of on one [1].
+
+    The two contacts of a strand of the diameter d are inclined by φ, with sin φ = p/2d at the pitch p of strands, and
+    are 2 cos² φ times as stiff as one. `places` (n, 3) are those of strands' ends [m].
+    """
+    apart = np.linalg.norm(places[1:] - places[:-1], axis=1)
+    return float(max(1.0, 2 * (1 - (apart.min() / (4 * radius)) ** 2)))
 
 
 def _modes_of_pile(law: ContactLaw, heave: Array, rub: Array) -> list[Mode]:

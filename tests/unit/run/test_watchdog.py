@@ -219,3 +219,14 @@ def test_extremes_within_all_limits_need_no_full_check() -> None:
 def test_an_extreme_beyond_a_limit_or_nan_needs_a_full_check(name: str, value: float) -> None:
     assert not content(**{name: value})
     assert not content(**{name: math.nan})
+
+
+def test_what_a_grip_lifts_above_the_wall_is_not_thrown_out() -> None:
+    phases = [{"type": "deposit"}, {"type": "lift", "radius_m": 0.01, "distance_m": 0.04, "speed_m_per_s": 0.1}]
+    scene = small({"engine": "links", "container.height_m": 0.1, "phases": phases})
+    state, watchdog = healthy(), build_watchdog(scene)
+    state.positions[:, 2], state.positions[:, :2] = 0.139, 0.0
+    watchdog.check(state, floor=0.0, time=1.0)
+    state.positions[0, 2] = 0.141
+    with pytest.raises(RunError, match="thrown out over the wall"):
+        watchdog.check(state, floor=0.0, time=1.0)
