@@ -326,6 +326,7 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+EVERY = 5  # frames from one check of linked bodies and of axes in solids to the next
 RESTLESS = 0.02  # largest change of speed of a bar between two frames of a pile at rest, over sqrt(g t)
 KICK = 0.05  # largest speed of a body that a plate has just reached, above twice its own [m/s]
 STEPS_A_PERIOD = 20  # least number of time steps in a period of a drive
@@ -345,9 +346,9 @@ def check_bodies(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
     last = None
     for frame in read_frames(path):
         ends, body = frame.segments, frame.body
-        solids = [kinds[kind] for kind in frame.kind[body]]
-        linked.update(linked_pairs(ends, body))
-        inside.update(axes_in_solids(ends, body, frame.normals, solids))
+        if frame.number % EVERY == 0:
+            linked.update(linked_pairs(ends, body))
+            inside.update(axes_in_solids(ends, body, frame.normals, [kinds[kind] for kind in frame.kind[body]]))
         if last is not None:
             count = min(len(last), len(ends))
             crossed.update(crossings(last[:count], ends[:count], body[:count]))
