@@ -23,8 +23,8 @@ def doubts_of(scene: Scene) -> Iterator[str]:
     if restitution < _STICKY:
         yield (
             f"contact.restitution: at {restitution:g} tangential dashpots, which friction does not limit, may hold "
-            f"bodies that should slide, by more than twice Coulomb's limit; where friction matters use {_STICKY:g} or "
-            "more"
+            f"bodies that should slide, by more than twice Coulomb's limit, and piles may not come to rest; use "
+            f"{_STICKY:g} or more"
         )
     if scene.phases[0].pours and scene.container.height_m is None:
         radius = scene.container.radius_m
