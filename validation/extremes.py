@@ -327,6 +327,7 @@ def check_run(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
 
 
 EVERY = 5  # frames from one check of linked bodies and of axes in solids to the next
+CORE = 0.7  # part of a bar's thickness in which no axis may be: overlaps and grooves between strands let it a bit below
 RESTLESS = 0.02  # largest change of speed of a bar between two frames of a pile at rest, over sqrt(g t)
 KICK = 0.05  # largest speed of a body that a plate has just reached, above twice its own [m/s]
 STEPS_A_PERIOD = 20  # least number of time steps in a period of a drive
@@ -348,7 +349,8 @@ def check_bodies(path: Path, scene: Mapping[str, Any]) -> dict[str, Any]:
         ends, body = frame.segments, frame.body
         if frame.number % EVERY == 0:
             linked.update(linked_pairs(ends, body))
-            inside.update(axes_in_solids(ends, body, frame.normals, [kinds[kind] for kind in frame.kind[body]]))
+            solids = [Solid(CORE * kind.normal, CORE * kind.in_plane) for kind in (kinds[k] for k in frame.kind[body])]
+            inside.update(axes_in_solids(ends, body, frame.normals, solids))
         if last is not None:
             count = min(len(last), len(ends))
             crossed.update(crossings(last[:count], ends[:count], body[:count]))
