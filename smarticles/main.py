@@ -47,6 +47,7 @@ FAILED, BAD_INPUT, STOPPED, BROKEN_PIPE = 1, 2, 130, 141  #: Exit statuses; 141:
 
 _SHELLS = ("bash", "zsh")
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+AGAIN_S = 0.02  # after which an interrupt that was dropped is raised again [s]: later than the end of what dropped it
 
 _DESCRIPTION = """\
 Discrete-element simulation of smarticles, U-shaped particles of three links.
@@ -193,6 +194,14 @@ def _stop(number: int, _frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+def _raise_again(dropped: "sys.UnraisableHookArgs") -> None:
+    """Raise a KeyboardInterrupt later that Python has dropped, since it came within a destructor or a callback."""
+    if isinstance(dropped.exc_value, KeyboardInterrupt):
+        signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
+    else:
+        sys.__unraisablehook__(dropped)
+
+
 def _ignore(_number: int, _frame: FrameType | None) -> None:
     """Ignore a signal in this process; unlike SIG_IGN, this handler is not inherited by child processes."""
 
@@ -206,11 +215,14 @@ def orderly_stop() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    before, hook = {number: signal.getsignal(number) for number in (*_SIGNALS, signal.SIGALRM)}, sys.unraisablehook
     try:
         for number, handler in before.items():
             signal.signal(number, _ignore if handler is signal.SIG_IGN else _stop)
+        sys.unraisablehook = _raise_again
         yield
     finally:
+        sys.unraisablehook = hook
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -179,7 +179,7 @@ CASES: dict[str, dict[str, Any]] = {
     },
     "taken over": {**U3, "phases": [{"type": "take-over", "run": "smarticles, standard"}, RELAX], "count": 4},
     "placed filament": {
-        "particle": {**WORM, "length_m": 6 * 1.6 * 1e-3 * np.sin(0.1) / 0.1},
+        "particle": {**WORM, "curvature_per_m": 0, "length_m": 6 * 1.6 * 1e-3 * np.sin(0.1) / 0.1},
         "count": 1,
         "fidelity": {"base": "draft", "stiffness_N_per_m": 10},
         "phases": [{"type": "place", "file": "arc.csv"}, RELAX],

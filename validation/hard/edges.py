@@ -202,7 +202,7 @@ def no_room(access: EngineAccess, out: Path, *, count: int, seconds: float) -> l
     except InputError as error:
         message = str(error)
     run = whole({**data, "container": {"radius_m": reach * 1.05}}, out)
-    return [says(message, f"use at least {reach:.4g} m"), *run.sound(), *_jammed(run)]
+    return [says(message, f"use at least {math.ceil(reach * 1e6 - 1e-6) / 1e6:.4g} m"), *run.sound(), *_jammed(run)]
 
 
 @hard("container of radius 0.7 w", {"count": 5, "seconds": 0.4}, {"count": 20, "seconds": 1.5})

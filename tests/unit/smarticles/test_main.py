@@ -153,6 +153,22 @@ def test_signals_stop_in_an_orderly_way(number: signal.Signals, request: pytest.
     assert signal.getsignal(number) is before
 
 
+class Signalled:
+    """An object that is destroyed while a signal comes."""
+
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_a_signal_within_a_destructor_is_not_lost() -> None:
+    def action() -> int:
+        Signalled()
+        threading.Event().wait(300)
+        return 0
+
+    assert guarded(action) == 130
+
+
 def test_ignored_signals_stay_ignored_here_but_not_in_children() -> None:
     ask = "import signal; print(signal.getsignal(signal.SIGHUP) is signal.SIG_IGN)"
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
