@@ -42,7 +42,8 @@ class Terminal:
         self.raw = ""  #: Everything that was written, escape codes included
         kept = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "COLUMNS", "LINES")}
         self.process = subprocess.Popen(
-            ["setsid", "--ctty", *words],  # Ctrl-C and hanging up become signals
+            # Ctrl-C and hanging up become signals, also where the tests run under `nohup`.
+            ["env", "--default-signal=HUP", "setsid", "--ctty", *words],
             cwd=folder,
             env={**kept, "TERM": "xterm-256color", **(environment or {})},
             stdin=slave,
