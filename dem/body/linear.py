@@ -49,8 +49,23 @@ def fused(a: Array, b: Array, c: Array) -> Array:
 
     product, (a1, a2), (b1, b2) = a * b, halves(a), halves(b)
     rest = ((a1 * b1 - product) + a1 * b2 + a2 * b1) + a2 * b2
-    terms = np.stack([product, rest, c], axis=-1).reshape(-1, 3)
-    return np.array([math.fsum(three) for three in terms.tolist()]).reshape(product.shape)
+    product, rest, c = np.broadcast_arrays(product, rest, c)
+    total, left = _two_sum(product, c)
+    left, least = _two_sum(left, rest)
+    total, left = _two_sum(total, left)
+    # What is left decides nothing unless it comes near half the distance to the next number.
+    half = np.spacing(np.nextafter(np.abs(total), 0.0)) / 2
+    unsure = ~(np.abs(left) + np.abs(least) < (1 - 1e-9) * half)
+    terms = np.stack([each[unsure] for each in (product, rest, c)], axis=-1)
+    total[unsure] = [math.fsum(three) for three in terms.tolist()]
+    return total
+
+
+def _two_sum(a: Array, b: Array) -> tuple[Array, Array]:
+    """Return the rounded sums of arrays, and what is left: exact; Knuth, The Art of Computer Programming 2, 4.2.2."""
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
 
 
 def turned(turn: Array, points: Array) -> Array:
