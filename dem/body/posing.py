@@ -13,6 +13,7 @@ from dem.body.bars import JOINED
 from dem.body.kinds import Kind
 from dem.body.linear import by_element, dot, matrix_product
 from dem.body.linkage import Joint, Linkage
+from dem.body.loops import bars_of
 from dem.body.particle import Particle
 from dem.body.placement import Bent, fitted
 from dem.errors import InputError
@@ -41,7 +42,7 @@ def posed(body: Particle | Kind, segments: Array) -> Pose:
         raise InputError(f"{len(segments)} bars, but a {_name(body)} has {bars}; {_points(body, bars)}")
     if isinstance(body, Kind) and body.bends:
         return _of_bent(body, segments)
-    local = body.bars.ends if isinstance(body, Kind) else _links(body)
+    local = bars_of(body)
     offs = []
     for flip in (False, True):  # a path passes some bars from their end to their start
         there = _directed(segments, local, flip=flip)
@@ -75,12 +76,6 @@ def _directed(segments: Array, local: Array, *, flip: bool) -> Array:
             todo.remove(k)
             known.append(k)
     return found
-
-
-def _links(particle: Particle) -> Array:
-    """Return both ends (3, 2, 3) of the links of a smarticle in its frame [m]."""
-    vertices = particle.boxes.vertices
-    return np.stack([vertices[:-1], vertices[1:]], axis=1)
 
 
 def _name(body: Particle | Kind) -> str:
